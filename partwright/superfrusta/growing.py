@@ -20,6 +20,7 @@ from partwright.superfrusta.initialisation import starts
 from partwright.superfrusta.limits import LIMITS
 from partwright.superfrusta.objective import occupancy_score
 from partwright.superfrusta.refining import freedom, sharpened, ties
+from partwright.superfrusta.repeat_candidates import distinct
 from partwright.superfrusta.samples import NOTHING, FitSamples, Rows
 from partwright.superfrusta.settings import Settings
 from partwright.superfrusta.solid_kinds import plainness
@@ -330,7 +331,9 @@ def _select(
         left -= best < fitted
         if best < fitted and samples.images:
             others = images(candidates[[best]], samples.images)[:, 0]
-            candidates = np.concatenate([candidates, others])
-            occupied = np.concatenate([occupied, samples.covered_by(others, samples.points)])
+            there = samples.covered_by(others, samples.points)
+            elsewhere = distinct(occupied[best], there)
+            candidates = np.concatenate([candidates, others[elsewhere]])
+            occupied = np.concatenate([occupied, there[elsewhere]])
     first, last = ([i for u, i in chosen if u is under] for under in (True, False))
     return Grown(candidates[first], candidates[last])

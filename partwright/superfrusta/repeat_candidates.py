@@ -114,18 +114,18 @@ def _of_part(
 ) -> Repeat | None:
     """One part for those that its images (K, N) cover. It may lie on a plane or an axis, so that some images
     are the same."""
-    distinct = _distinct(parts[base], images)
-    if not distinct:
+    elsewhere = distinct(parts[base], images)
+    if not elsewhere:
         return None
-    covered = images[distinct].any(axis=0)
+    covered = images[elsewhere].any(axis=0)
     share = (parts & covered).sum(axis=1) / np.maximum(parts.sum(axis=1), 1)
     share[:locked] = share[base] = 0
     share[rows[:, Column.SIGN] != rows[base, Column.SIGN]] = 0
     replaced = frozenset(np.flatnonzero(share > _COVERED).tolist())
-    return Repeat((base,), tuple(group[i] for i in distinct), replaced) if replaced else None
+    return Repeat((base,), tuple(group[i] for i in elsewhere), replaced) if replaced else None
 
 
-def _distinct(base: Mask, images: Mask) -> list[int]:
+def distinct(base: Mask, images: Mask) -> list[int]:
     """Images (K, N) that are neither where the part itself is nor where an earlier one is."""
     kept: list[int] = []
     for i, one in enumerate(images):
