@@ -57,21 +57,22 @@ def repeat(
 
     Repeats are taken that are worth the most: the parts that they save, less what they cost of R; or all that
     is on one side of a plane stands for the other. The copies of each leaf are refitted as one. Together they
-    may not lower the objective, nor leave a part further off than 2.5 % of the longest side and than any was
-    by over half a percent; where they do, they are given up one by one.
+    may not lower the objective by more than a part's price, nor leave a part further off than 2.5 % of the
+    longest side and than any was by over half a percent; where they do, they are given up one by one. Of what
+    is worth the most, to within that price, there are as few leaves as can be.
     An IoU that the settings ask for is kept. The first `locked` rows stay leaves of their own.
     """
     whole = measured(samples, _leaves(rows, []), settings)
     furthest = max(whole.off + _FURTHER, _NEAR)
 
     def good(trial: Trial) -> bool:
-        if trial.off > furthest or trial.value < whole.value:
+        if trial.off > furthest or trial.value < whole.value - settings.alpha:
             return False
         if settings.min_iou is None:
             return True
         return _grid_iou(samples, trial) >= min(_grid_iou(samples, whole), settings.min_iou)
 
-    best = whole
+    candidates: list[Trial] = []
     tolerance = max(LOCAL_TOLERANCE, symmetry_tolerance(samples, rows))
     wanted = repeat_candidates(samples, rows, groups(found), locked)
     mirrors = [one.isometry for one in nearly if one.kind == "mirror"]
@@ -98,12 +99,19 @@ def repeat(
     for chosen, first in zip(choices, tried, strict=True):
         for left in range(_GIVEN_UP, -1, -1):
             trials = first if left == _GIVEN_UP else refitted(chosen)
-            better = [trial for trial in trials if good(trial)]
-            best = max([best, *better], key=lambda trial: trial.value)
-            if best is not whole or len(chosen) == 1 or not left:
+            candidates += [trial for trial in trials if good(trial)]
+            if candidates or len(chosen) == 1 or not left:
                 break
             chosen = _without_the_worst(samples, rows, chosen, settings)
-    return best.leaves
+    return _fewest([whole, *candidates], settings.alpha).leaves
+
+
+def _fewest(trials: Sequence[Trial], equal: float) -> Trial:
+    """The one with the fewest leaves of those whose value is within so much of the most: which of them has
+    that is chance."""
+    least = max(trial.value for trial in trials) - equal
+    nearly = [trial for trial in trials if trial.value >= least]
+    return min(nearly, key=lambda trial: (len(trial.leaves), -trial.value))
 
 
 def symmetry_tolerance(samples: FitSamples, rows: Rows) -> float:
