@@ -169,7 +169,8 @@ def carve(samples: FitSamples, rows: Rows, settings: Settings, most: int) -> Gro
 def _grown(samples: FitSamples, wanted: list[Region], rows: Rows, settings: Settings, most: int) -> Grown:
     if not wanted or most <= 0:
         return Grown(NOTHING, NOTHING)
-    wanted = _unlike(samples, wanted)
+    if len(rows):  # of two halves of the whole shape either may be what tells how it bends
+        wanted = _unlike(samples, wanted)
     field = samples.field(rows)  # which all regions are fitted beside
     candidates = fit_regions(samples, wanted, settings)
     return _select(samples, candidates, rows, field < 0, settings.price / _PRICE_DIVISOR, most)
