@@ -23,20 +23,24 @@ def first_alike(samples: FitSamples, regions: Sequence[tuple[NDArray[np.bool_], 
     alike: list[int] = []
     sizes = [int(np.count_nonzero(voxels)) for voxels, _ in regions]
     for index, (voxels, sign) in enumerate(regions):
-
-        def may_be(other: int, size: int = sizes[index], sign: float = sign) -> bool:
-            least, most = sorted((size, sizes[other]))
-            return alike[other] == other and regions[other][1] == sign and least >= _AS_LARGE * most
-
-        rivals = [regions[other][0] if may_be(other) else None for other in range(index)]
-        places = _images(samples, voxels) if any(rival is not None for rival in rivals) else []
-        same = (
+        rivals = [
             other
-            for other, rival in enumerate(rivals)
-            if rival is not None and any(rival[place].mean() > _COVERED for place in places)
-        )
+            for other in range(index)
+            if alike[other] == other and regions[other][1] == sign and _as_large(sizes[index], sizes[other])
+        ]
+        places = _images(samples, voxels) if rivals else []
+        same = (other for other in rivals if _covers(regions[other][0], places))
         alike.append(next(same, index))
     return alike
+
+
+def _as_large(one: int, other: int) -> bool:
+    return min(one, other) >= _AS_LARGE * max(one, other)
+
+
+def _covers(region: NDArray[np.bool_], images: Sequence[NDArray[np.int64]]) -> bool:
+    """Whether most of the voxels (n,) of any image are a region's."""
+    return any(region[voxels].mean() > _COVERED for voxels in images)
 
 
 def _images(samples: FitSamples, region: NDArray[np.bool_]) -> list[NDArray[np.int64]]:
