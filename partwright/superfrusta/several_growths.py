@@ -50,6 +50,7 @@ class SeveralGrowths:
                 one.choose()
                 return one, None
 
+        search.samples.find_symmetries()  # once, before growths side by side ask for them
         beside = SideBySide[tuple[ResidualFit, bool | None]](search.samples, search.checkpoint, self.told)
         found = beside(growth, search.settings.attempts)
         self.account([one for one, _ in found], perf_counter() - began)
