@@ -14,8 +14,8 @@ from partwright.fields import kernel
 from partwright.fields.columns import Column
 from partwright.rows import corners
 from partwright.superfrusta import solid_starts
+from partwright.superfrusta.alike_regions import first_alike
 from partwright.superfrusta.families import locked_values, with_locked_values
-from partwright.superfrusta.images import first_alike
 from partwright.superfrusta.initialisation import starts
 from partwright.superfrusta.limits import LIMITS
 from partwright.superfrusta.objective import occupancy_score

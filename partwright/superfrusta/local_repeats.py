@@ -39,8 +39,7 @@ _TURNS = Rotation.create_group("O").as_matrix().round()  # of a cube: a frame ma
 
 
 def local_repeats(
-    samples: FitSamples,
-    rows: Rows,
+    seen: Occupancies,
     locked: int,
     tolerance: float = LOCAL_TOLERANCE,
     nearly: Sequence[Isometry] = (),
@@ -51,11 +50,10 @@ def local_repeats(
     tolerance: mean distance from the shape's surface to what a part stands for, moved; unit lengths. nearly:
     isometries that may hold for a part after a small motion: one arm is raised a little higher.
     """
-    forms = _Forms(samples, rows, locked, tolerance)
-    seen = Occupancies.of(samples, rows)
+    forms = _Forms(seen.samples, seen.rows, locked, tolerance)
     found = (
         one
-        for base in range(locked, len(rows))
+        for base in range(locked, len(seen.rows))
         for group in (forms.group(base), *forms.nearly(base, nearly))
         if group
         for one in seen.candidates(group, [base], locked)

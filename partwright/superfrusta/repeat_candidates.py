@@ -38,25 +38,21 @@ class Repeat:
         return self.replaced | frozenset(self.bases)
 
 
-def repeat_candidates(
-    samples: FitSamples, rows: Rows, found: Sequence[tuple[Isometry, ...]], locked: int
-) -> list[Repeat]:
+def repeat_candidates(seen: Occupancies, found: Sequence[tuple[Isometry, ...]], locked: int) -> list[Repeat]:
     """Of sets of isometries under which the shape stays what it is; none twice.
 
     Bases that replace nothing may bring what is missing where their images go. The first `locked` rows are in
     no repeat.
     """
-    seen = Occupancies.of(samples, rows)
-    every = range(locked, len(rows))
+    every = range(locked, len(seen.rows))
     return without_twins(one for group in found for one in seen.candidates(group, every, locked))
 
 
-def whole_sides(samples: FitSamples, rows: Rows, planes: Sequence[Symmetry], locked: int) -> list[Repeat]:
+def whole_sides(seen: Occupancies, planes: Sequence[Symmetry], locked: int) -> list[Repeat]:
     """All that lies on one side of a mirror plane for all that lies on the other, and the other way about.
 
     However differently both were cut into parts, and whatever they have in common.
     """
-    seen = Occupancies.of(samples, rows)
     sizes = np.maximum(seen.parts.sum(axis=1), 1)
     found = []
     for plane in planes:

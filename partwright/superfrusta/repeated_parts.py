@@ -12,7 +12,7 @@ from partwright.at_once import at_once
 from partwright.superfrusta.deviations import deviations, norm
 from partwright.superfrusta.local_repeats import LOCAL_TOLERANCE, local_repeats
 from partwright.superfrusta.objective import score
-from partwright.superfrusta.repeat_candidates import Repeat, repeat_candidates, whole_sides
+from partwright.superfrusta.repeat_candidates import Occupancies, Repeat, repeat_candidates, whole_sides
 from partwright.superfrusta.samples import FitSamples, Rows
 from partwright.superfrusta.settings import Settings
 from partwright.superfrusta.symmetric_fit import RepeatedPart, expanded, refit
@@ -74,12 +74,12 @@ def repeat(
 
     candidates: list[Trial] = []
     tolerance = max(LOCAL_TOLERANCE, symmetry_tolerance(samples, rows))
-    wanted = repeat_candidates(samples, rows, groups(found), locked)
+    seen = Occupancies.of(samples, rows)
+    wanted = repeat_candidates(seen, groups(found), locked)
     mirrors = [one.isometry for one in nearly if one.kind == "mirror"]
-    wanted += local_repeats(samples, rows, locked, tolerance, mirrors[:_NEARLY])
-
+    wanted += local_repeats(seen, locked, tolerance, mirrors[:_NEARLY])
     planes = [one for one in found if one.kind == "mirror"]
-    sides = whole_sides(samples, rows, planes[:_PLANES], locked)
+    sides = whole_sides(seen, planes[:_PLANES], locked)
 
     def refitted(chosen: Sequence[Repeat]) -> list[Trial]:
         trials = [measured(samples, _leaves(rows, chosen), settings)]

@@ -20,7 +20,7 @@ from partwright.superfrusta.backend import Kernel, backend, watched
 from partwright.superfrusta.far_cells import ALONG, CELL, HALF_SIDE, beyond_too, cell_middles, cell_of
 from partwright.superfrusta.part_surfaces import surface_points
 from partwright.superfrusta.settings import Settings
-from partwright.superfrusta.symmetry import NEARLY, Isometry, Symmetry, symmetries, together
+from partwright.superfrusta.symmetry import NEARLY, Isometry, Symmetry, generated_by, symmetries
 
 Rows = NDArray[np.float32]
 NOTHING: Rows = np.empty((0, WIDTH), np.float32)
@@ -208,7 +208,7 @@ class FitSamples:
     @cached_property
     def images(self) -> tuple[Isometry, ...]:
         """What takes the shape to itself, well enough for a part to be tried where they take it."""
-        return together(self.find_symmetries(), _ALIKE)
+        return generated_by(self.find_symmetries(), _ALIKE)
 
     @cached_property
     def inside(self) -> NDArray[np.bool_]:

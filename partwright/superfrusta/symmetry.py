@@ -150,7 +150,7 @@ def groups(found: Sequence[Symmetry], most: int = 24) -> list[tuple[Isometry, ..
     return [group for group in [*together, *cyclic] if group]
 
 
-def together(found: Sequence[Symmetry], tolerance: float, most: int = 24) -> tuple[Isometry, ...]:
+def generated_by(found: Sequence[Symmetry], tolerance: float, most: int = 24) -> tuple[Isometry, ...]:
     """What the symmetries that hold to a tolerance generate together, the most exact first, and none that
     makes more than `most` of them; the identity is left out."""
     generators: list[Isometry] = []

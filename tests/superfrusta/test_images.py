@@ -13,10 +13,10 @@ from partwright.assembly.rows import rows
 from partwright.fields import SuperFrustum
 from partwright.shapes import load_shape
 from partwright.superfrusta import Settings
+from partwright.superfrusta.alike_regions import first_alike
 from partwright.superfrusta.growing import carve, grow
-from partwright.superfrusta.images import first_alike
 from partwright.superfrusta.samples import FitSamples
-from partwright.superfrusta.symmetry import Symmetry, mirror, rotation, together
+from partwright.superfrusta.symmetry import Symmetry, generated_by, mirror, rotation
 from tests.superfrusta.meshes import box, table
 from tests.superfrusta.rows import box as box_row
 from tests.superfrusta.rows import subtracting
@@ -48,12 +48,12 @@ def test_symmetries_generate_what_takes_a_shape_to_itself(samples: FitSamples) -
     """Of a table: two mirrors and half a turn. Thirds and quarters of a turn make twelve, and sevenths with
     them too many; what holds badly counts for nothing."""
     assert len(samples.images) == 3
-    assert len(together([turned(3), turned(4)], 0.01)) == 11
-    assert len(together([turned(3), turned(4), turned(7)], 0.01)) == 11
-    assert len(together([turned(3), turned(4, 0.02)], 0.01)) == 2
+    assert len(generated_by([turned(3), turned(4)], 0.01)) == 11
+    assert len(generated_by([turned(3), turned(4), turned(7)], 0.01)) == 11
+    assert len(generated_by([turned(3), turned(4, 0.02)], 0.01)) == 2
     plane = Symmetry("mirror", 2, mirror(np.array([1.0, 0, 0]), ORIGIN), 0.0)
-    assert len(together([turned(3), plane], 0.01)) == 5
-    assert together([], 0.01) == together([turned(30)], 0.01) == ()
+    assert len(generated_by([turned(3), plane], 0.01)) == 5
+    assert generated_by([], 0.01) == generated_by([turned(30)], 0.01) == ()
 
 
 def test_symmetries_are_not_looked_for_where_none_are_wanted() -> None:

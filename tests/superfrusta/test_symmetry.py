@@ -154,12 +154,14 @@ def test_a_side_stands_for_the_other_however_both_are_cut_into_parts() -> None:
     rows = np.concatenate([exact[:1], left, halves])
     plane = next(one for one in found if one.kind == "mirror" and abs(one.axis[0]) > 0.99)
     both = {((1, 2), (3, 4, 5, 6)), ((3, 4, 5, 6), (1, 2))}
-    sides = repeat_candidates.whole_sides(samples, rows, [plane], 0)
+    seen = repeat_candidates.Occupancies.of(samples, rows)
+    sides = repeat_candidates.whole_sides(seen, [plane], 0)
     assert {(one.bases, tuple(sorted(one.replaced))) for one in sides} == both
     assert all(one.isometries == (plane.isometry,) for one in sides)
-    fewer = repeat_candidates.whole_sides(samples, rows, [plane], 2)
+    fewer = repeat_candidates.whole_sides(seen, [plane], 2)
     assert {one.bases for one in fewer} == {(2,), (3, 4, 5, 6)}
-    assert repeat_candidates.whole_sides(samples, rows[:3], [plane], 0) == []
+    left_alone = repeat_candidates.Occupancies.of(samples, rows[:3])
+    assert repeat_candidates.whole_sides(left_alone, [plane], 0) == []
     leaves = repeat(samples, rows, found, DRAFT)
     assert score(samples, expanded(leaves)) == pytest.approx(score(samples, exact), abs=5e-3)
     assert [1 + len(leaf.isometries) for leaf in leaves] == [1, 4]

@@ -1,6 +1,6 @@
-"""What the symmetries of a shape take a part, or a region, to: what serves one place serves the others.
+"""Regions that the symmetries of a shape take to one another: what is fitted to one serves the others.
 
-A search that finds each leg of a table by itself takes as many rounds, and gives legs that differ.
+A search that fits each leg of a table by itself takes as long for each, and gives legs that differ.
 """
 
 from __future__ import annotations
