@@ -34,6 +34,7 @@ Floats = NDArray[np.float32]
 
 _DRAWN = 14_000  # points of the shape's surface
 _CORNERS = 10_000  # of the input's vertices, at most
+_NOTHING = 1e-3  # unit lengths: what reaches no deeper is as good as not there
 _LOOSE = 1.25  # times the field: where a walk was longer, it need not have ended at what is nearest
 _AMONG_FURTHEST = 0.7  # of the furthest: so far are those that are looked at once more
 _SLOPE = 2.5  # times that a part's field outside may be less than the distance, where it is bent or tapers
@@ -143,8 +144,9 @@ class CloseLook:
     def _of_surfaces(self, rows: Rows, on_parts: Floats) -> tuple[Floats, Floats]:
         """The assembly's field (N,) at the shape's points, and those (K, 3) of its parts that are on its own
         surface."""
-        field = self.samples.distance_of(rows, self.points)
-        return field, on_parts[np.abs(self.samples.distance_of(rows, on_parts)) < ON]
+        field, there = (self.samples.distance_of(rows, points) for points in (self.points, on_parts))
+        # Just above zero nothing may be left: a cut ends there that goes a little beyond the part.
+        return field, on_parts[(there > -ON) & (there < _NOTHING)]
 
     def _of_shape(
         self, rows: Rows, added: NDArray[np.int64], field: Floats, on_it: Floats, least: float
@@ -188,8 +190,11 @@ class CloseLook:
         that they walk to it, and by looking around where that may be another than the shortest."""
         if not len(points):
             return field
-        place, there = walked_to(self.samples, rows, points, field)
-        way = np.where(np.abs(there) < CLOSE / 2, np.linalg.norm(place - points, axis=1), np.inf)
+        place, there = (np.empty_like(one) for one in (points, field))
+        for side, level in ((field < 0, 0.0), (field >= 0, -_NOTHING)):
+            place[side], there[side] = walked_to(self.samples, rows, points[side], field[side], level)
+        arrived = (np.abs(there) < CLOSE / 2) & ((field < 0) | (there < 0))
+        way = np.where(arrived, np.linalg.norm(place - points, axis=1), np.inf)
         off = np.clip(way, np.abs(field), most)
         loose = way > _LOOSE * np.abs(field)
         for _ in range(_TIMES):

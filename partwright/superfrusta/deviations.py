@@ -145,14 +145,17 @@ def walked(samples: FitSamples, rows: Rows, points: Floats, gap: Floats) -> Floa
     return np.where(np.abs(field) < CLOSE, np.maximum(gap, np.linalg.norm(place - points, axis=1)), gap)
 
 
-def walked_to(samples: FitSamples, rows: Rows, points: Floats, field: Floats) -> tuple[Floats, Floats]:
-    """Where points (n, 3) come to that walk to the assembly's surface, and its field (n,) there."""
+def walked_to(
+    samples: FitSamples, rows: Rows, points: Floats, field: Floats, level: float = 0.0
+) -> tuple[Floats, Floats]:
+    """Where points (n, 3) come to that walk to the assembly's surface, or to another level of its field, and
+    that (n,) there."""
     place = points
     for _ in range(_STEPS):
         around = samples.distance_of(rows, (place + _AROUND).reshape(-1, 3)).reshape(len(_AROUND), -1)
         slope = ((around[:3] - around[3:]) / (2 * _BESIDE)).T
         steepness = np.maximum((slope**2).sum(axis=1), _FLAT)
-        place = place - (field / steepness)[:, None] * slope
+        place = place - ((field - level) / steepness)[:, None] * slope
         field = samples.distance_of(rows, place)
     return place, field
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from partwright.fields.columns import Column
 from partwright.shapes import Shape
 from partwright.superfrusta.close_look import CloseLook, Seen
-from partwright.superfrusta.growing import finalists
+from partwright.superfrusta.growing import finalists, grow
 from partwright.superfrusta.last_polish import BRIEF, MOST_COPIES, SPENT, Polish, Trial
 from partwright.superfrusta.mending import Mending
 from partwright.superfrusta.merging import folded, owners
@@ -28,9 +28,12 @@ from partwright.superfrusta.symmetric_fit import LeafSteps, RepeatedPart, expand
 
 Mask = NDArray[np.bool_]
 Leaves = list[RepeatedPart]
+_Place = tuple[NDArray[np.float32], float]  # a point, and how far about it
 
 _ENOUGH = 0.031  # unit lengths, 1.7 % of the longest side, 0.96 % outwards: what is nearer is left alone
+_PLACES = 2  # that are looked at for each that is changed: of some no way is known
 _SAME_PLACE = 0.03  # unit lengths
+_ABOUT = 0.2  # unit lengths: how far from a point that is missed more may be that belongs to it
 _REFITTED = 2  # changes of one place that are polished, of those that promise most
 _LOOKS = 6  # at each
 _HOPELESS, _STILL = 0.01, 0.003  # of the value: so much worse before it is polished, and after half of that
@@ -110,14 +113,18 @@ class _LastChanges:
     def run(self, leaves: Leaves, moving: Mask) -> Iterator[Leaves]:
         best = self.looked_at(leaves, moving)
         bounds = _Bounds(best.trial.score - SPENT, self.overlap(best) + _OVERLAP)
-        given_up: list[NDArray[np.float32]] = []
-        for _ in range(self.settings.changes):
+        given_up: list[_Place] = []
+        tried = 0
+        for _ in range(_PLACES * self.settings.changes):
             worst = self.worst(best, given_up)
-            if worst is None:
+            if worst is None or tried == self.settings.changes:
                 break
-            found = self.changed(best, worst, bounds)
+            ways = list(self.ways(best, worst))
+            tried += bool(ways)
+            found = self.gaining(best, ways, bounds)
             if found is None:
-                given_up.append(best.trial.off.points[worst])
+                off = best.trial.off
+                given_up.append((off.points[worst], max(_SAME_PLACE, float(off.off[worst]))))
             else:
                 best = found
                 yield best.leaves
@@ -148,23 +155,13 @@ class _LastChanges:
         ]
         return _State(leaves, state.moving, trial, trial.value - self.price * len(leaves))
 
-    def worst(self, best: _State, given_up: list[NDArray[np.float32]]) -> int | None:
-        """The point at which the part is off that is so furthest, but for places that were given up."""
+    def worst(self, best: _State, given_up: list[_Place]) -> int | None:
+        """The point that is furthest off of parts that move, but for places that were given up."""
         off = best.trial.off
-        for leaf in np.argsort(-best.trial.by_leaf, kind="stable"):
-            if best.trial.by_leaf[leaf] < _ENOUGH:
-                break
-            mine = np.flatnonzero(best.leaf[off.part] == leaf)
-            worst = int(mine[off.off[mine].argmax()])
-            away = [np.linalg.norm(off.points[worst] - place) for place in given_up]
-            if best.moving[leaf] and min(away, default=np.inf) > _SAME_PLACE:
-                return worst
-        return None
-
-    def changed(self, best: _State, worst: int, bounds: _Bounds) -> _State | None:
-        """With what is about a point changed in the way that promises most, or else in another; None where
-        none gains."""
-        return self.gaining(best, list(self.ways(best, worst)), bounds)
+        left = best.moving[best.leaf[off.part]] & (off.off >= _ENOUGH)
+        for place, reach in given_up:
+            left &= np.linalg.norm(off.points - place, axis=1) > reach
+        return int(np.where(left, off.off, 0).argmax()) if left.any() else None
 
     def gaining(self, best: _State, ways: list[_State], bounds: _Bounds) -> _State | None:
         """The first of these that gains when it is polished, within bounds, of those that promise most;
@@ -195,16 +192,18 @@ class _LastChanges:
         """With one part more that cuts or fills what is about a point; None where there is none, or no room
         for it."""
         off = best.trial.off
-        copy = int(off.part[worst])
-        leaf = int(best.leaf[copy])
+        leaf = int(best.leaf[off.part[worst]])
         if not self.has_room(best, leaf):
             return None
-        if off.distance[worst] > 0:
-            new = self.cuts(best, worst) if self.settings.carving else []
-        else:
-            missed = self.mending.missed(best.rows, off, worst)[:1]
-            new = [self.mending.fitted(voxels, best.rows, best.rows[copy])[0] for voxels in missed]
-        return self.repeated(best, new[0], leaf) if new else None
+        found = self.cuts(best, worst) if off.distance[worst] > 0 else self.fills(best, worst)
+        return self.repeated(best, self.promising(best, found), leaf) if len(found) else None
+
+    def promising(self, best: _State, found: Rows) -> NDArray[np.float32]:
+        """Of new parts (K, 17), the one (17,) that is best by itself: what overlaps best may stick out."""
+        if len(found) == 1:
+            return found[0]
+        alone = [self.looked_at(*best.with_new(RepeatedPart(row))).value for row in found]
+        return found[int(np.argmax(alone))]
 
     def with_others(self, one: _State, best: _State, worst: int) -> _State:
         """The same at other places, cut or filled likewise, that are nearly as far off: while one of them is
@@ -212,7 +211,7 @@ class _LastChanges:
         off = best.trial.off
         for _ in range(_TOGETHER - 1):
             there = one.trial.off
-            further = self.worst(one, [off.points[worst]])
+            further = self.worst(one, [(off.points[worst], _SAME_PLACE)])
             if further is None or there.off[further] < _AS_FAR * off.off[worst]:
                 break
             alike = _is_outside(there, further) == _is_outside(off, worst)
@@ -222,8 +221,24 @@ class _LastChanges:
             one = found
         return one
 
-    def cuts(self, best: _State, worst: int) -> list[NDArray[np.float32]]:
-        return list(self.mending.holes(best.rows, best.trial.off, worst)[:1])
+    def cuts(self, best: _State, worst: int) -> Rows:
+        """(K, 17) to subtract about a point."""
+        if not self.settings.carving:
+            return best.rows[:0]
+        return self.mending.holes(best.rows, best.trial.off, worst)[:1]
+
+    def fills(self, best: _State, worst: int) -> Rows:
+        """(K, 17) to add about a point: for all that is missed there, and, as that may go all around the
+        assembly, for this place alone."""
+        off = best.trial.off
+        like = best.rows[off.part[worst]]
+        missed = self.mending.missed(best.rows, off, worst)[:1]
+        of_all = [self.mending.fitted(voxels, best.rows, like) for voxels in missed]
+        near = np.linalg.norm(off.points - off.points[worst], axis=1) < _ABOUT
+        about = off.points[near & (off.distance <= 0)]
+        here = self.samples.about(about.min(axis=0) - off.off[worst], about.max(axis=0) + off.off[worst])
+        grown = grow(here, best.rows, replace(self.settings, subtract=False), 1)
+        return np.concatenate([*of_all, grown.first, grown.last])
 
     def has_room(self, best: _State, leaf: int) -> bool:
         """Whether a part budget allows one more, with its copies."""

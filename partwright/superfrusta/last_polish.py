@@ -33,14 +33,18 @@ _SHARPNESS = 100.0  # of the sigmoid, for solids of ordinary thickness
 # What the loss of overlaps counts beside lengths: it goes with the square of what is wrong, and near the best
 # falls far less than R rises. How much less differs, so they take turns.
 _SCALES = (30.0, 10.0)
-_POWER = 16.0  # by which points of a part count: those within a quarter of the furthest, more or less
+# Unit lengths, a ninth of the longest side: in several such cubes, a leaf that is off has several faults.
+# If only the furthest of each leaf counted, mending one of two that are as far off would be no gain.
+_PLACE = 0.2
+_PLACES_A_SIDE = 64  # that are told apart: nothing lies further out
+_POWER = 16.0  # by which points of a place count: those within a quarter of the furthest, more or less
 _LEAST_SHARE = 0.01  # of what the furthest counts
 _LINEAR = 4.0  # sharpness at which an occupancy near the surface is the distance, but for its sign
 _LEAST_OFF = 1e-4  # unit lengths
 _GAIN = 2e-5  # of the value, from which on a step is taken
 _FIRMER = 2.5  # times the settings' price on lengths: what is seen counts more, once all parts are there
 _GLARING = 0.08  # unit lengths: 2.5 % of the longest side outwards, or 4.5 % that is missing
-_GLARES = 2.0  # price on each unit length beyond, part by part: worth several parts, which the norm is not
+_GLARES = 2.0  # price on each unit length beyond, place by place: worth several parts, which the norm is not
 SPENT = 5e-3  # of R, at most, for lengths
 _OVERLAP = 0.01  # of what parts cover: so much more may be covered twice, which thin shapes hardly feel
 _LEAST_DAMPING = 1e-3
@@ -88,11 +92,15 @@ LASTING, BRIEF = Damping(0.1, 0.1, 10.0), Damping(1.0, 0.7, 3.0)  # for many loo
 
 @dataclass(frozen=True)
 class Trial:
-    """Leaves (L, 17), where their copies are off, how far each leaf is (L,), and what they are worth."""
+    """Leaves (L, 17), where their copies are off, and what they are worth.
+
+    place: (n,) that each point belongs to. by_place: (P,) how far a leaf is off there.
+    """
 
     rows: Rows
     off: Seen
-    by_leaf: Floats
+    place: NDArray[np.int64]
+    by_place: Floats
     score: float
     value: float
 
@@ -115,10 +123,12 @@ class Polish:
         copies, samples = self.steps.copies(rows), self.look.samples
         looked, scored = partial(self.look.deviations, copies), partial(score, samples, copies)
         off, reached = both(looked, scored, samples.threads)
-        by_leaf = np.zeros(len(rows))
-        np.maximum.at(by_leaf, self.steps.leaf[off.part], off.off)
-        price = self.firmness * norm(by_leaf) + _GLARES * float(np.maximum(by_leaf - _GLARING, 0).sum())
-        return Trial(rows, off, by_leaf, reached, reached - price)
+        place = _places(self.steps.leaf[off.part], off.points)
+        by_place = np.zeros(place.max(initial=-1) + 1)
+        np.maximum.at(by_place, place, off.off)
+        glaring = float(np.maximum(by_place - _GLARING, 0).sum())
+        price = self.firmness * norm(by_place) + _GLARES * glaring
+        return Trial(rows, off, place, by_place, reached, reached - price)
 
     def best(self, rows: Rows) -> Rows:
         """The leaves' rows (L, 17) after steps that gain."""
@@ -132,7 +142,7 @@ class Polish:
         vain = 0  # scales in a row
         for scale in cycle(_SCALES):
             given_up = 2 * self.looks > self.settings.looks and best.value < hopeless
-            if not best.by_leaf.any() or vain == len(_SCALES) or given_up:
+            if not len(best.by_place) or vain == len(_SCALES) or given_up:
                 break
             if not vain:
                 terms = partial(self.overlaps, best), partial(self.lengths, best)
@@ -170,14 +180,14 @@ class Polish:
 
     def lengths(self, at: Trial) -> Equations:
         """Gradient of the price on how far leaves are off, and the matrix of the least squares whose weights
-        give it. Of a leaf those points count that are nearly the furthest."""
+        give it. Of a place those points count that are nearly the furthest."""
         samples, off, copies = self.look.samples, at.off, self.steps.copies(at.rows)
-        leaf = self.steps.leaf[off.part]
-        share = (off.off / at.by_leaf[leaf]) ** _POWER
+        share = (off.off / at.by_place[at.place]) ** _POWER
         felt = np.flatnonzero(share > _LEAST_SHARE)
-        in_all = np.bincount(leaf[felt], share[felt], len(at.by_leaf))
-        of_leaf = self.firmness * (at.by_leaf / norm(at.by_leaf)) ** 3
-        price = of_leaf[leaf[felt]] * share[felt] / in_all[leaf[felt]]
+        place = at.place[felt]
+        in_all = np.bincount(place, share[felt], len(at.by_place))
+        of_place = self.firmness * (at.by_place / norm(at.by_place)) ** 3
+        price = of_place[place] * share[felt] / in_all[place]
         points, outside = off.points[felt], off.distance[felt] > 0
         slope = price * np.where(outside, -1.0, 1.0) * off.times[felt]  # of the price by the field
         gradient = kernel.gradients(copies, points, slope.astype(np.float32), samples.threads)
@@ -187,3 +197,12 @@ class Polish:
         target = Target(points, there, weight * np.float32((4 / _LINEAR) ** 2))
         _, _, matrix = samples.kernel.normal_equations(copies, target, _LINEAR, threads=samples.threads)
         return self.steps.projected(gradient.ravel(), matrix)
+
+
+def _places(leaf: NDArray[np.int64], points: NDArray[np.float32]) -> NDArray[np.int64]:
+    """(n,) the place that points (n, 3) at which leaves (n,) are off belong to."""
+    half = _PLACES_A_SIDE // 2
+    cube = np.clip(np.rint(points / _PLACE).astype(np.int64) + half, 0, _PLACES_A_SIDE - 1)
+    shape = (int(leaf.max(initial=0)) + 1, *(3 * [_PLACES_A_SIDE]))
+    code = np.ravel_multi_index((leaf, *cube.T), shape)
+    return np.unique(code, return_inverse=True)[1].astype(np.int64)

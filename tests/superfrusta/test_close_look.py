@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from trimesh.util import concatenate
 
+from partwright.fields.columns import Column
 from partwright.metrics.comparison import Comparison
 from partwright.shapes import Shape, load_shape
 from partwright.superfrusta import Settings
@@ -62,6 +63,19 @@ def test_it_sees_what_the_report_will_say(seed: int) -> None:
     told = Comparison(assembly_of(shape, rows, SETTINGS), shape).deviation
     assert lengths.max() == pytest.approx(told.maximum, rel=0.1)
     assert lengths[times > 1].max(initial=0) == pytest.approx(told.protrusion, rel=0.1, abs=0.01)
+
+
+def test_what_a_cut_leaves_nothing_of_is_not_there() -> None:
+    """A plate over a block is taken away by a cut that goes just beyond it, and a tower is missing."""
+    height, plate = 0.8, ((0.1, 0.1, 0.04), (0.0, 0.0, 0.65))
+    shape = load_shape(union(box((1.8, 0.8, 0.5)), box((0.3, 0.3, height), (0.0, 0.0, 0.25 + height / 2))))
+    down = shape.frame.to_unit(np.zeros((1, 3)))[0]
+    size, place = plate
+    cut = box_row(tuple(side + 0.004 for side in size), tuple(place + down))
+    cut[Column.SIGN] = -1
+    whole = [box_row((1.8, 0.8, 0.5), tuple(down)), box_row(size, tuple(place + down)), cut]
+    _, lengths, _ = seen(shape, np.array(whole))
+    assert lengths.max() == pytest.approx(height, rel=0.05)
 
 
 def test_what_cannot_be_seen_is_not_off() -> None:

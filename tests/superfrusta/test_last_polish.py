@@ -12,7 +12,7 @@ from partwright.shapes import Shape, load_shape
 from partwright.superfrusta import Settings
 from partwright.superfrusta.close_look import CloseLook
 from partwright.superfrusta.deviations import norm
-from partwright.superfrusta.last_polish import Polish, last_polished
+from partwright.superfrusta.last_polish import Polish, Trial, last_polished
 from partwright.superfrusta.objective import score, volume_iou
 from partwright.superfrusta.samples import FitSamples
 from partwright.superfrusta.symmetric_fit import LeafSteps, RepeatedPart, expanded
@@ -80,6 +80,27 @@ def test_copies_move_as_one() -> None:
     seen = CloseLook.at(shape, samples).deviations(expanded(after)).by_part
     assert norm(seen) < 0.06
     assert seen[1] == pytest.approx(seen[2], abs=0.012)
+
+
+def test_each_place_that_a_part_is_off_counts(shape: Shape, samples: FitSamples) -> None:
+    """A body that is too long on one side, and on two: by the same length, but twice."""
+
+    def polish(low: float, high: float) -> Trial:
+        body = box_row((1.2 + low + high, 0.8, 0.5), (-0.3 + (high - low) / 2, 0.0, 0.0))
+        given = [RepeatedPart(body), RepeatedPart(box_row(*ARM))]
+        made = Polish(CloseLook.at(shape, samples), SETTINGS, LeafSteps.of(given, SETTINGS, BOTH))
+        return made.trial(np.stack([one.row for one in given]))
+
+    one, two = polish(0.06, 0.0), polish(0.06, 0.06)
+    assert one.by_place.max() == pytest.approx(two.by_place.max(), rel=0.1)
+    assert norm(two.by_place) > 1.1 * norm(one.by_place)
+    for trial in (one, two):
+        assert len(trial.by_place) == len(np.unique(trial.place)) > 1
+        for place, furthest in enumerate(trial.by_place):
+            mine = trial.place == place
+            assert trial.off.off[mine].max() == pytest.approx(furthest)
+            assert (np.ptp(trial.off.points[mine], axis=0) < 0.2 + 1e-6).all()
+            assert len(np.unique(trial.off.part[mine])) == 1
 
 
 def test_an_iou_that_is_asked_for_is_kept(shape: Shape, samples: FitSamples) -> None:
