@@ -32,7 +32,7 @@ _Place = tuple[NDArray[np.float32], float]  # a point, and how far about it
 
 _ENOUGH = 0.031  # unit lengths, 1.7 % of the longest side, 0.96 % outwards: what is nearer is left alone
 _PLACES = 2  # that are looked at for each that is changed: of some no way is known
-_SAME_PLACE = 0.03  # unit lengths
+_SAME_PLACE = 0.03  # unit lengths: what is as near to a place that is changed is changed with it
 _ABOUT = 0.2  # unit lengths: how far from a point that is missed more may be that belongs to it
 _REFITTED = 2  # changes of one place that are polished, of those that promise most
 _LOOKS = 6  # at each
@@ -124,7 +124,7 @@ class _LastChanges:
             found = self.gaining(best, ways, bounds)
             if found is None:
                 off = best.trial.off
-                given_up.append((off.points[worst], max(_SAME_PLACE, float(off.off[worst]))))
+                given_up.append((off.points[worst], float(off.off[worst])))
             else:
                 best = found
                 yield best.leaves
