@@ -169,7 +169,7 @@ std::vector<float> decompose(std::vector<float> field, const Grid& grid, const P
   std::vector<float> depths;
   for (int region = 0; region < peeling.regions; ++region) {
     const std::vector<uint32_t> order = by_depth(field);
-    if (double(order.size()) < peeling.least_voxels) break;
+    if (order.empty() || double(order.size()) < peeling.least_voxels) break;
     const float deepest = -field[order[0]];
     if (deepest < peeling.least_depth) break;
 

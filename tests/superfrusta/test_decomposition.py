@@ -97,6 +97,16 @@ def test_an_empty_field_gives_nothing(value: float) -> None:
     assert (labels == -1).all()
 
 
+@pytest.mark.parametrize("least", [0.0, 0.5, 1.0])
+def test_nothing_inside_is_no_region_however_small_regions_may_be(least: float) -> None:
+    """A local grid may lie outside of the shape; a share of its voxels is then none."""
+    labels, depths = decompose(np.full((5, 6, 7), 0.1, np.float32), least_voxels=least)
+    assert depths == []
+    assert (labels == -1).all()
+    ball_alone = decompose(ball(grid(), 0.3).astype(np.float32), least_voxels=least)
+    assert len(ball_alone[1]) >= 1
+
+
 def test_a_single_voxel() -> None:
     field = np.ones((5, 6, 7))
     field[2, 3, 4] = -0.01
