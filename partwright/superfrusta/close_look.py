@@ -190,9 +190,9 @@ class CloseLook:
         that they walk to it, and by looking around where that may be another than the shortest."""
         if not len(points):
             return field
-        place, there = (np.empty_like(one) for one in (points, field))
-        for side, level in ((field < 0, 0.0), (field >= 0, -_NOTHING)):
-            place[side], there[side] = walked_to(self.samples, rows, points[side], field[side], level)
+        # What is missing is as far off as something is beneath the surface: a cut may leave nothing there.
+        level = np.where(field < 0, np.float32(0), np.float32(-_NOTHING))
+        place, there = walked_to(self.samples, rows, points, field, level)
         arrived = (np.abs(there) < CLOSE / 2) & ((field < 0) | (there < 0))
         way = np.where(arrived, np.linalg.norm(place - points, axis=1), np.inf)
         off = np.clip(way, np.abs(field), most)

@@ -29,6 +29,7 @@ _AROUND = _BESIDE * np.concatenate([np.eye(3), -np.eye(3)])[:, None].astype(np.f
 _STEPS, _FLAT = 4, 0.1  # of a walk to the surface; least squared slope that a step is taken by
 _DEEPEST_BLEND = 0.08  # unit lengths: a quarter of the largest blend
 OUTSIDE = 1.2  # times that sticking out counts, which is seen before what is missing
+_ABOUT = 0.2  # unit lengths: how far from a point that is off a narrow hole, or what is missing, may reach
 _POWER = 4.0  # of the norm over parts: near the largest, but with a word for the others
 
 
@@ -63,6 +64,13 @@ class Deviations:
         """The point at which a part is furthest off."""
         mine = np.flatnonzero(self.part == part)
         return int(mine[self.off[mine].argmax()])
+
+    def about(self, worst: int) -> tuple[Floats, Floats]:
+        """Corners (3,) of a box around a point that sticks out or is missing, and what does so near it."""
+        outside = self.distance > 0
+        near = np.linalg.norm(self.points - self.points[worst], axis=1) < _ABOUT
+        points = self.points[near & (outside == outside[worst])]
+        return points.min(axis=0) - self.off[worst], points.max(axis=0) + self.off[worst]
 
 
 def norm(off: NDArray[np.float64]) -> float:
@@ -146,10 +154,10 @@ def walked(samples: FitSamples, rows: Rows, points: Floats, gap: Floats) -> Floa
 
 
 def walked_to(
-    samples: FitSamples, rows: Rows, points: Floats, field: Floats, level: float = 0.0
+    samples: FitSamples, rows: Rows, points: Floats, field: Floats, level: float | Floats = 0.0
 ) -> tuple[Floats, Floats]:
-    """Where points (n, 3) come to that walk to the assembly's surface, or to another level of its field, and
-    that (n,) there."""
+    """Where points (n, 3) come to that walk to the assembly's surface, or to other levels (n,) of its field,
+    and that (n,) there."""
     place = points
     for _ in range(_STEPS):
         around = samples.distance_of(rows, (place + _AROUND).reshape(-1, 3)).reshape(len(_AROUND), -1)

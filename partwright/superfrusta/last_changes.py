@@ -33,7 +33,6 @@ _Place = tuple[NDArray[np.float32], float]  # a point, and how far about it
 _ENOUGH = 0.031  # unit lengths, 1.7 % of the longest side, 0.96 % outwards: what is nearer is left alone
 _PLACES = 2  # that are looked at for each that is changed: of some no way is known
 _SAME_PLACE = 0.03  # unit lengths: what is as near to a place that is changed is changed with it
-_ABOUT = 0.2  # unit lengths: how far from a point that is missed more may be that belongs to it
 _REFITTED = 2  # changes of one place that are polished, of those that promise most
 _LOOKS = 6  # at each
 _HOPELESS, _STILL = 0.01, 0.003  # of the value: so much worse before it is polished, and after half of that
@@ -234,9 +233,7 @@ class _LastChanges:
         like = best.rows[off.part[worst]]
         missed = self.mending.missed(best.rows, off, worst)[:1]
         of_all = [self.mending.fitted(voxels, best.rows, like) for voxels in missed]
-        near = np.linalg.norm(off.points - off.points[worst], axis=1) < _ABOUT
-        about = off.points[near & (off.distance <= 0)]
-        here = self.samples.about(about.min(axis=0) - off.off[worst], about.max(axis=0) + off.off[worst])
+        here = self.samples.about(*off.about(worst))
         grown = grow(here, best.rows, replace(self.settings, subtract=False), 1)
         return np.concatenate([*of_all, grown.first, grown.last])
 

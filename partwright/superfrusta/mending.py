@@ -41,7 +41,6 @@ _AGAIN = 0.01  # of the objective: after so much progress what was given up is t
 _STAGES: Stages = ((40.0, 4), (100.0, 5))
 _HOPELESS = 0.02  # of the objective: what is so much worse after a refit goes no further
 _REFITTED = 2  # of the ways to change a part
-_ABOUT = 0.2  # unit lengths: how far from a point that is off a narrow hole may reach
 _HOLES = 2  # that are looked for there
 _AS_FAR = 0.6  # of the furthest: what is missing elsewhere beside the same part is tried together with it
 _AT_ONCE = 4  # such places at most
@@ -321,11 +320,7 @@ class Mending:
     def holes(self, rows: Rows, off: Deviations, worst: int) -> Rows:
         """Parts (M, 17) to subtract about a point that is covered, by samples of that place alone: a hole may
         be as narrow as a voxel."""
-        place = off.points[worst]
-        near = np.linalg.norm(off.points - place, axis=1) < _ABOUT
-        about = off.points[near & (off.distance > 0)]
-        low, high = about.min(axis=0) - off.off[worst], about.max(axis=0) + off.off[worst]
-        return carve(self.samples.about(low, high, rows), rows, self.settings, _HOLES).last
+        return carve(self.samples.about(*off.about(worst), rows), rows, self.settings, _HOLES).last
 
     def fitted(self, voxels: Mask, others: Rows, like: NDArray[np.float32], under: bool = False) -> Rows:
         """The best part (1, 17) for the voxels, beside the others and before those that are subtracted if it
