@@ -30,7 +30,10 @@ _STEPS, _FLAT = 4, 0.1  # of a walk to the surface; least squared slope that a s
 _DEEPEST_BLEND = 0.08  # unit lengths: a quarter of the largest blend
 OUTSIDE = 1.2  # times that sticking out counts, which is seen before what is missing
 _ABOUT = 0.2  # unit lengths: how far from a point that is off a narrow hole, or what is missing, may reach
-_POWER = 4.0  # of the norm over parts: near the largest, but with a word for the others
+_PLACE = 0.2  # unit lengths, a ninth of the longest side: in several such cubes a part has several faults
+_PLACES_A_SIDE = 64  # that are told apart: nothing lies further out
+_MOST = np.float32(0.3)  # unit lengths that count in one place
+_POWER = 4.0  # of the norm over places: near the largest, but with a word for the others
 
 
 @dataclass(frozen=True)
@@ -57,8 +60,9 @@ class Deviations:
 
     @property
     def norm(self) -> float:
-        """One length for all parts."""
-        return norm(self.by_part)
+        """One length for all places, whatever is further off than a sixth of the longest side: with few parts
+        overlaps tell what else is left out."""
+        return norm(by_place(places(self.part, self.points), np.minimum(self.off, _MOST)))
 
     def worst(self, part: int) -> int:
         """The point at which a part is furthest off."""
@@ -73,8 +77,28 @@ class Deviations:
         return points.min(axis=0) - self.off[worst], points.max(axis=0) + self.off[worst]
 
 
+def places(part: NDArray[np.int64], points: Floats) -> NDArray[np.int64]:
+    """(n,) the place that points (n, 3) at which parts (n,) are off belong to.
+
+    A part that is off in several places has several faults: if only its furthest counted, mending one of two
+    that are as far off would be no gain.
+    """
+    half = _PLACES_A_SIDE // 2
+    cube = np.clip(np.rint(points / _PLACE).astype(np.int64) + half, 0, _PLACES_A_SIDE - 1)
+    shape = (int(part.max(initial=0)) + 1, *(3 * [_PLACES_A_SIDE]))
+    code = np.ravel_multi_index((part, *cube.T), shape)
+    return np.unique(code, return_inverse=True)[1].astype(np.int64)
+
+
+def by_place(place: NDArray[np.int64], off: Floats) -> NDArray[np.float64]:
+    """(P,) the largest of each place."""
+    result = np.zeros(place.max(initial=-1) + 1)
+    np.maximum.at(result, place, off)
+    return result
+
+
 def norm(off: NDArray[np.float64]) -> float:
-    """One length for how far off several parts are: near the largest."""
+    """One length for how far off several places are: near the largest."""
     return float((off**_POWER).sum() ** (1 / _POWER))
 
 

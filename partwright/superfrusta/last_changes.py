@@ -28,10 +28,10 @@ from partwright.superfrusta.symmetric_fit import LeafSteps, RepeatedPart, expand
 
 Mask = NDArray[np.bool_]
 Leaves = list[RepeatedPart]
-_Place = tuple[NDArray[np.float32], float]  # a point, and how far about it
+_GivenUp = tuple[NDArray[np.float32], float]  # a point, and how far about it
 
 _ENOUGH = 0.031  # unit lengths, 1.7 % of the longest side, 0.96 % outwards: what is nearer is left alone
-_PLACES = 2  # that are looked at for each that is changed: of some no way is known
+_LOOKED_AT = 2  # that are looked at for each that is changed: of some no way is known
 _SAME_PLACE = 0.03  # unit lengths: what is as near to a place that is changed is changed with it
 _REFITTED = 2  # changes of one place that are polished, of those that promise most
 _LOOKS = 6  # at each
@@ -112,9 +112,9 @@ class _LastChanges:
     def run(self, leaves: Leaves, moving: Mask) -> Iterator[Leaves]:
         best = self.looked_at(leaves, moving)
         bounds = _Bounds(best.trial.score - SPENT, self.overlap(best) + _OVERLAP)
-        given_up: list[_Place] = []
+        given_up: list[_GivenUp] = []
         tried = 0
-        for _ in range(_PLACES * self.settings.changes):
+        for _ in range(_LOOKED_AT * self.settings.changes):
             worst = self.worst(best, given_up)
             if worst is None or tried == self.settings.changes:
                 break
@@ -154,7 +154,7 @@ class _LastChanges:
         ]
         return _State(leaves, state.moving, trial, trial.value - self.price * len(leaves))
 
-    def worst(self, best: _State, given_up: list[_Place]) -> int | None:
+    def worst(self, best: _State, given_up: list[_GivenUp]) -> int | None:
         """The point that is furthest off of parts that move, but for places that were given up."""
         off = best.trial.off
         left = best.moving[best.leaf[off.part]] & (off.off >= _ENOUGH)

@@ -19,7 +19,7 @@ from partwright.fields.columns import Column
 from partwright.fields.kernel import Target
 from partwright.shapes import Shape
 from partwright.superfrusta.close_look import CloseLook, Seen
-from partwright.superfrusta.deviations import norm
+from partwright.superfrusta.deviations import by_place, norm, places
 from partwright.superfrusta.objective import score, volume_iou
 from partwright.superfrusta.refining import penalties, sharpened
 from partwright.superfrusta.samples import FitSamples, Rows
@@ -33,10 +33,6 @@ _SHARPNESS = 100.0  # of the sigmoid, for solids of ordinary thickness
 # What the loss of overlaps counts beside lengths: it goes with the square of what is wrong, and near the best
 # falls far less than R rises. How much less differs, so they take turns.
 _SCALES = (30.0, 10.0)
-# Unit lengths, a ninth of the longest side: in several such cubes, a leaf that is off has several faults.
-# If only the furthest of each leaf counted, mending one of two that are as far off would be no gain.
-_PLACE = 0.2
-_PLACES_A_SIDE = 64  # that are told apart: nothing lies further out
 _POWER = 16.0  # by which points of a place count: those within a quarter of the furthest, more or less
 _LEAST_SHARE = 0.01  # of what the furthest counts
 _LINEAR = 4.0  # sharpness at which an occupancy near the surface is the distance, but for its sign
@@ -123,12 +119,11 @@ class Polish:
         copies, samples = self.steps.copies(rows), self.look.samples
         looked, scored = partial(self.look.deviations, copies), partial(score, samples, copies)
         off, reached = both(looked, scored, samples.threads)
-        place = _places(self.steps.leaf[off.part], off.points)
-        by_place = np.zeros(place.max(initial=-1) + 1)
-        np.maximum.at(by_place, place, off.off)
-        glaring = float(np.maximum(by_place - _GLARING, 0).sum())
-        price = self.firmness * norm(by_place) + _GLARES * glaring
-        return Trial(rows, off, place, by_place, reached, reached - price)
+        place = places(self.steps.leaf[off.part], off.points)
+        furthest = by_place(place, off.off)
+        glaring = float(np.maximum(furthest - _GLARING, 0).sum())
+        price = self.firmness * norm(furthest) + _GLARES * glaring
+        return Trial(rows, off, place, furthest, reached, reached - price)
 
     def best(self, rows: Rows) -> Rows:
         """The leaves' rows (L, 17) after steps that gain."""
@@ -197,12 +192,3 @@ class Polish:
         target = Target(points, there, weight * np.float32((4 / _LINEAR) ** 2))
         _, _, matrix = samples.kernel.normal_equations(copies, target, _LINEAR, threads=samples.threads)
         return self.steps.projected(gradient.ravel(), matrix)
-
-
-def _places(leaf: NDArray[np.int64], points: NDArray[np.float32]) -> NDArray[np.int64]:
-    """(n,) the place that points (n, 3) at which leaves (n,) are off belong to."""
-    half = _PLACES_A_SIDE // 2
-    cube = np.clip(np.rint(points / _PLACE).astype(np.int64) + half, 0, _PLACES_A_SIDE - 1)
-    shape = (int(leaf.max(initial=0)) + 1, *(3 * [_PLACES_A_SIDE]))
-    code = np.ravel_multi_index((leaf, *cube.T), shape)
-    return np.unique(code, return_inverse=True)[1].astype(np.int64)

@@ -307,7 +307,7 @@ def test_a_hole_that_is_narrower_than_voxels_tell_is_seen_and_carved() -> None:
     assert 2 * radius < 3 * found.grid.spacing
     solid = np.array([box_row(*plate)])
     off = deviations(found, solid)
-    assert off.norm == pytest.approx(OUTSIDE * 0.15, abs=0.02)  # half of the plate's thickness
+    assert off.by_part == pytest.approx([OUTSIDE * 0.15], abs=0.02)  # half of the plate's thickness
     assert np.linalg.norm(off.points[off.worst(0), :2] - (0.3, 0.2)) < radius + 0.01
     mended = Mending(found, SETTINGS)(solid)
     (cut,) = mended[mended[:, Column.SIGN] < 0]
