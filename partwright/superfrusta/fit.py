@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from partwright.assembly import Assembly
 from partwright.errors import CancelledError, EmptyShapeError
-from partwright.meshing import has_exact_mesh
+from partwright.meshing import has_exact_mesh, mesh_assembly
 from partwright.methods import Checkpoint, CurvePoint, FitRequest, Fitted, Outcome, timed
 from partwright.shapes import Shape
 from partwright.superfrusta.far_places import Solid
@@ -82,21 +84,27 @@ def fit(request: FitRequest[Settings]) -> Fitted:
         )
     search.leaves = search.leaves or [RepeatedPart(row) for row in search.best]
     whole_search = outcome != "interrupted" and not settings.curve
+
+    def of_leaves(leaves: list[RepeatedPart]) -> Assembly:
+        return assembled(np.stack([leaf.row for leaf in leaves]), moves=[leaf.moves for leaf in leaves])
+
     try:
-        if whole_search:
-            with search.timed("rejoin"):
-                # Less what holes take.
-                search.leaves = rejoined(search.samples, search.leaves, search.settings)
         known = holes.cut()
-        if whole_search and search.mending:
-            search.polish(shape, known)
+        if whole_search:
+            if search.mending:
+                search.polish(shape, known)
+            with search.timed("rejoin"):
+                surface = partial(_surface, shape, of_leaves)
+                search.leaves = rejoined(
+                    shape, search.samples, search.leaves, search.settings, surface, known
+                )
     except CancelledError:
         outcome = "interrupted"
-    leaves = search.leaves
-    whole = assembled(np.stack([leaf.row for leaf in leaves]), moves=[leaf.moves for leaf in leaves])
+    whole = of_leaves(search.leaves)
     if features is not None:
         # Of the search none says how it would be drawn: there a part costs more than a feature does.
-        rival = search.objective(search.best, len(leaves)) - (_DEARER - 1) * settings.alpha * len(leaves)
+        count = len(search.leaves)
+        rival = search.objective(search.best, count) - (_DEARER - 1) * settings.alpha * count
         preferred = features.objective - features.off >= rival
         if outcome != "interrupted":
             with timed(seconds, "freeform"):
@@ -118,6 +126,14 @@ def fit(request: FitRequest[Settings]) -> Fitted:
         told += hole_warnings(shape, missing)
         told += mouth_warnings(shape, featured.mouths_left_out(own, missing))
     return Fitted(whole, outcome, search.seconds, search.history, tuple(reversed(curve)), warnings=told)
+
+
+def _surface(
+    shape: Shape, assembled: Callable[[list[RepeatedPart]], Assembly], leaves: list[RepeatedPart]
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """As it will be seen, vertices (V, 3) in the unit frame and faces (F, 3)."""
+    mesh = mesh_assembly(assembled(leaves))
+    return shape.frame.to_unit(mesh.vertices), np.asarray(mesh.faces, np.int64)
 
 
 def _of_features(

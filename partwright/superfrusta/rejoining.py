@@ -5,106 +5,213 @@ A neck as thin as a voxel holds next to nothing, so that nothing else feels whet
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
+from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
 
-from partwright.fields.columns import Column
+from partwright.fields.columns import ROTATION, SIZE, TRANSLATION, WIDTH, Column
+from partwright.meshing.small_components import components
+from partwright.shapes import Shape
+from partwright.shapes.topology import signed_volumes
+from partwright.superfrusta.families import locked_values, with_locked_values
 from partwright.superfrusta.growing import Region, fit_regions
+from partwright.superfrusta.limits import LEAST_BLEND, SHORTEST
 from partwright.superfrusta.objective import score
 from partwright.superfrusta.samples import FitSamples, Rows
 from partwright.superfrusta.settings import Settings
 from partwright.superfrusta.symmetric_fit import RepeatedPart, expanded
 
-_TOUCHING = 0.6  # voxels: parts as near as that to one of the grid's points may meet beside it
-_FINE = 9  # points along two voxels
-_AT_ONCE = 100  # voxels that are looked at so
+Floats = NDArray[np.float64]
+Neck = TypeVar("Neck")
+Mask = NDArray[np.bool_]
+Surface = Callable[[list[RepeatedPart]], tuple[Floats, NDArray[np.int64]]]
+"""Vertices (V, 3), in the unit frame, and faces (F, 3) of the surface that leaves make, copies included."""
+
+_CRUMB = 1e-3  # of the volume: what is smaller is a chip, not a piece that should be joined
+_BESIDE = 0.02  # unit lengths: what is as near to where a gap is narrowest belongs to it
+_BETWEEN = np.array([0.25, 0.5, 0.75])[:, None, None]  # of the way from voxel to voxel
 _MARGIN, _ELSEWHERE = 0.2, 0.3  # of a region that one part is fitted to
 _ALL_AROUND = np.ones((3, 3, 3), bool)
 
 
 @dataclass(frozen=True)
 class Pieces:
-    """What of an assembly hangs together. of_part: (M,) numbers of the pieces that its parts are of, those
-    that are subtracted left out. field: (X, Y, Z) its distance on the grid. owner: (X, Y, Z) number of the
-    piece that each voxel within it is of, -1 for the others."""
+    """What of an assembly hangs together. points: (N, 3) of all its surface, unit frame. piece: (N,) numbers
+    of the pieces that they are of, the largest first, -1 for chips."""
 
-    count: int
-    of_part: NDArray[np.int64]
-    field: NDArray[np.float32]
-    owner: NDArray[np.int64]
+    points: Floats
+    piece: NDArray[np.int64]
+
+    @property
+    def count(self) -> int:
+        return int(self.piece.max(initial=-1)) + 1
 
     @classmethod
-    def of(cls, samples: FitSamples, rows: Rows) -> Pieces:
-        """Parts are of one piece where a point of the grid is near both, or where each is nearest in one
-        body, as where a blend joins them."""
-        grid, field = samples.grid, samples.grid_field(rows)
-        near = np.flatnonzero(field.ravel() < grid.spacing)
-        apart = samples.parts_of(_added(rows), samples.grid_points[near])
-        body = ndimage.label(field < 0)[0].ravel()[near]
-        within, nearest = body > 0, apart.argmin(axis=0)
-        fills = np.zeros((len(apart), int(body.max(initial=0)) + 1), bool)
-        fills[nearest[within], body[within]] = True
-        shared = np.concatenate([apart < _TOUCHING * grid.spacing, fills], axis=1).astype(np.float32)
-        count, piece = connected_components(shared @ shared.T > 0, directed=False)
-        owner = np.full(field.shape, -1, np.int64)
-        owner.ravel()[near[within]] = piece[nearest[within]]
-        return cls(count, piece, field, owner)
-
-    def meet(self, samples: FitSamples, rows: Rows, new: Rows, about: NDArray[np.float32]) -> bool:
-        """Whether new rows (K, 17) join all pieces, by overlaps near points (N, 3)."""
-        steps = samples.grid.spacing * np.linspace(-1, 1, _FINE)
-        around = np.stack(np.meshgrid(steps, steps, steps), axis=-1).reshape(-1, 3).astype(np.float32)
-        piece = np.append(self.of_part, self.count + np.arange(len(new)))
-        meet = np.zeros((piece.max() + 1,) * 2, bool)
-        for some in np.array_split(about, -(-len(about) // _AT_ONCE)):
-            points = (some[:, None] + around).reshape(-1, 3)
-            within = samples.parts_of(np.concatenate([_added(rows), new]), points) < 0
-            filled = np.stack([within[piece == k].any(axis=0) for k in range(len(meet))]).astype(np.float32)
-            meet |= filled @ filled.T > 0
-        return bool(connected_components(meet, directed=False)[0] == 1)
+    def of(cls, vertices: Floats, faces: NDArray[np.int64]) -> Pieces:
+        count, component = components(faces, len(vertices))
+        volume = signed_volumes(vertices, faces, component[faces[:, 0]])
+        order = np.argsort(-volume, kind="stable")
+        order = order[volume[order] > _CRUMB * volume.sum()]
+        number = np.full(count, -1)
+        number[order] = np.arange(len(order))
+        return cls(vertices, number[component])
 
 
-def rejoined(samples: FitSamples, leaves: list[RepeatedPart], settings: Settings) -> list[RepeatedPart]:
-    """Leaves, and a part for each neck between pieces that float, where the shape is one body.
+def rejoined(
+    shape: Shape,
+    samples: FitSamples,
+    leaves: list[RepeatedPart],
+    settings: Settings,
+    surface: Surface,
+    known: int = 0,
+) -> list[RepeatedPart]:
+    """Leaves, and before the last `known` of them a part for each neck between pieces that float, where the
+    shape is one body.
 
-    The same leaves where they are one piece, or so near that the grid does not see it; where that would cost
-    more than the parts' price, or take more of them than a budget has room for.
+    The same leaves where they are one piece, where no neck joins any, would cost more than the parts' price,
+    or would take more of them than a budget has room for.
     """
     rows = expanded(leaves)
-    if ndimage.label(samples.grid.values < 0, _ALL_AROUND)[1] != 1:
+    field = samples.grid_field(rows)
+    if not _is_body(shape, samples) or is_one(samples, rows, field):
         return leaves
-    apart = Pieces.of(samples, rows)
-    regions = [
-        Region(voxels, rows, samples.grid.spacing, _MARGIN, _ELSEWHERE) for voxels in necks(samples, apart)
-    ]
-    room = len(regions) if settings.max_parts is None else settings.max_parts - len(leaves)
-    if not regions or len(regions) > room:
-        return leaves
-    new = fit_regions(samples, regions, settings)
-    about = samples.grid_points[np.any([region.voxels for region in regions], axis=0)]
-    whole = np.concatenate([rows, new])
-    worse = score(samples, whole) < score(samples, rows) - settings.price * len(new)
-    if worse or not apart.meet(samples, rows, new, about):
-        return leaves
-    return [*leaves, *map(RepeatedPart, new)]
-
-
-def necks(samples: FitSamples, apart: Pieces) -> list[NDArray[np.bool_]]:
-    """Voxels (X * Y * Z,) of the shape that lie between pieces, and beside these, of each neck."""
+    apart = Pieces.of(*surface(leaves))
     if apart.count < 2:
-        return []
-    solid = samples.grid.values < 0
-    label, count = ndimage.label(solid & (apart.field > 0), _ALL_AROUND)
-    beside = np.zeros((apart.count, count + 1), bool)
-    for piece, at in enumerate(beside):
-        at[label[ndimage.binary_dilation(apart.owner == piece, _ALL_AROUND)]] = True
-    between = [number for number in np.flatnonzero(beside.sum(axis=0) > 1) if number]
-    return [(ndimage.binary_dilation(label == one, _ALL_AROUND) & solid).ravel() for one in between]
+        return leaves
+    last = len(leaves) - known
+    for way in (_fitted, _rods):
+        new = way(samples, apart, rows, field, settings)
+        room = len(new) if settings.max_parts is None else settings.max_parts - len(leaves)
+        if not 0 < len(new) <= room:
+            continue
+        whole = [*leaves[:last], *map(RepeatedPart, new), *leaves[last:]]
+        worse = score(samples, expanded(whole)) < score(samples, rows) - settings.price * len(new)
+        if not worse and Pieces.of(*surface(whole)).count < apart.count:
+            return whole
+    return leaves
 
 
-def _added(rows: Rows) -> Rows:
-    return rows[rows[:, Column.SIGN] > 0]
+def _is_body(shape: Shape, samples: FitSamples) -> bool:
+    """Whether a shape is one: by its voxels, where its surfaces go through one another, or by its surface,
+    where its walls are thinner than those."""
+    voxels, _ = ndimage.label(samples.grid.values < 0, _ALL_AROUND)
+    return int(voxels.max()) == 1 or Pieces.of(shape.vertices, shape.faces).count == 1
+
+
+def is_one(samples: FitSamples, rows: Rows, field: NDArray[np.float32]) -> bool:
+    """Whether an assembly is one piece for sure: its voxels hang together by ways that lie within it.
+
+    field: (X, Y, Z) of it on the grid.
+    """
+    place = np.arange(field.size).reshape(field.shape)
+    links = []
+    for axis in range(3):
+        depth, number = np.moveaxis(field, axis, 0), np.moveaxis(place, axis, 0)
+        within = (depth[:-1] < 0) & (depth[1:] < 0)
+        links.append(np.stack([number[:-1][within], number[1:][within]]))
+    link, flat = np.concatenate(links, axis=1), field.ravel()
+    # Nothing that is nearer to a point within than the surface is outside.
+    sure = -flat[link].sum(axis=0) > samples.grid.spacing
+    piece = _linked(link[:, sure], field.size)
+    asked = link[:, ~sure & (piece[link[0]] != piece[link[1]])]
+    ends = samples.grid_points[asked]
+    between = (ends[0] + _BETWEEN * (ends[1] - ends[0])).reshape(-1, 3).astype(np.float32)
+    open_ = (samples.distance_of(rows, between).reshape(len(_BETWEEN), -1) < 0).all(axis=0)
+    size = np.bincount(
+        _linked(np.concatenate([link[:, sure], asked[:, open_]], axis=1), field.size)[flat < 0]
+    )
+    return bool(np.count_nonzero(size > _CRUMB * size.sum()) < 2)
+
+
+def _linked(links: NDArray[np.int64], count: int) -> NDArray[np.int64]:
+    """(count,) numbers of what links (2, N) join."""
+    one, other = links
+    graph = coo_array((np.ones(len(one), np.int8), (one, other)), shape=(count, count))
+    return np.asarray(connected_components(graph, directed=False)[1], np.int64)
+
+
+def needed(count: int, necks: Iterable[tuple[Neck, list[int]]]) -> list[Neck]:
+    """The necks that join what those before them do not, of so many pieces."""
+    joined = np.eye(count, dtype=bool)
+    found = []
+    for neck, pieces in necks:
+        if not joined[np.ix_(pieces, pieces)].all():
+            joined |= np.outer(joined[pieces].any(axis=0), joined[pieces].any(axis=0))
+            found.append(neck)
+    return found
+
+
+def _fitted(
+    samples: FitSamples, apart: Pieces, rows: Rows, field: NDArray[np.float32], settings: Settings
+) -> Rows:
+    """Parts (K, 17) for regions within the shape that no part fills and that lie beside several pieces."""
+    found = needed(apart.count, _left_open(samples, apart, field))
+    depth = samples.grid.spacing
+    regions = [Region(voxels, rows, depth, _MARGIN, _ELSEWHERE) for voxels in found]
+    return fit_regions(samples, regions, settings) if regions else rows[:0]
+
+
+def _left_open(
+    samples: FitSamples, apart: Pieces, field: NDArray[np.float32]
+) -> Iterator[tuple[Mask, list[int]]]:
+    """Voxels (X * Y * Z,) of such a region and of the shape around it, and the pieces that it lies beside."""
+    solid, shown = samples.grid.values < 0, apart.piece >= 0
+    beside = (np.abs(field) < 2 * samples.grid.spacing).ravel()
+    owner = np.full(field.size, -1)
+    nearest = cKDTree(apart.points[shown]).query(samples.grid_points[beside])[1]
+    owner[beside] = apart.piece[shown][nearest]
+    owner = np.where(field < 0, owner.reshape(field.shape), -1)
+    label, _ = ndimage.label(solid & (field > 0), _ALL_AROUND)
+    touched = [
+        set(label[ndimage.binary_dilation(owner == k, _ALL_AROUND)].tolist()) for k in range(apart.count)
+    ]
+    for one in sorted(set().union(*touched) - {0}):
+        pieces = [k for k, numbers in enumerate(touched) if one in numbers]
+        if len(pieces) > 1:
+            yield (ndimage.binary_dilation(label == one, _ALL_AROUND) & solid).ravel(), pieces
+
+
+def _rods(
+    samples: FitSamples, apart: Pieces, rows: Rows, field: NDArray[np.float32], settings: Settings
+) -> Rows:
+    """Cylinders (K, 17) across gaps that are too narrow for a fit to feel, as thick as the shape is there."""
+    found = needed(apart.count, _gaps(samples, apart))
+    if not found:
+        return rows[:0]
+    return with_locked_values(np.stack(found), locked_values(settings.family, settings.smooth))
+
+
+def _gaps(samples: FitSamples, apart: Pieces) -> Iterator[tuple[NDArray[np.float32], list[int]]]:
+    """Where each piece but the largest is nearest to another across the shape's inside: a cylinder (17,)."""
+    for k in range(1, apart.count):
+        own, others = apart.piece == k, (apart.piece >= 0) & (apart.piece != k)
+        away, nearest = cKDTree(apart.points[others]).query(apart.points[own])
+        one, other = apart.points[own], apart.points[others][nearest]
+        depth = -samples.near_distance(((one + other) / 2).astype(np.float32))
+        near = np.flatnonzero((depth > 0) & (away < away[depth > 0].min(initial=np.inf) + _BESIDE))
+        if len(near):
+            best = near[depth[near].argmax()]
+            joins = int(apart.piece[others][nearest[best]])
+            yield _cylinder(one[best], other[best], float(depth[best])), [joins, k]
+
+
+def _cylinder(one: Floats, other: Floats, radius: float) -> NDArray[np.float32]:
+    """(17,) about the way between two points (3,), and its radius beyond."""
+    along = other - one
+    length = float(np.linalg.norm(along))
+    row = np.zeros(WIDTH, np.float32)
+    row[TRANSLATION] = (one + other) / 2
+    turn = Rotation.align_vectors(along[None], [[0, 0, 1]])[0] if length > 0 else Rotation.identity()
+    row[ROTATION] = turn.as_quat(scalar_first=True)
+    row[SIZE] = np.maximum([2 * radius, 2 * radius, length + 2 * radius], SHORTEST)
+    row[[Column.ROUNDNESS, Column.TAPER, Column.SIGN]] = 1
+    row[Column.BLEND] = LEAST_BLEND
+    return row
