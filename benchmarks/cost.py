@@ -5,7 +5,7 @@
 Seconds are those of the processor, of the process and all its threads, of which each has one: on a machine
 that is busy with other work they are hardly more. --before names the Python in whose environment the other
 version is installed. Searches are chaotic: one shape ends elsewhere after any change, so parts and scores are
-told on average. The tables go to benchmarks/results/cost.md.
+told on average. The tables go to --output, benchmarks/results/cost.md if none is given.
 """
 
 from __future__ import annotations
@@ -62,8 +62,10 @@ def fitted(python: str, entry: Entry, seed: int) -> Cost:
     stages = {stage: spent for stage, spent in report["seconds"].items() if stage != "all"}
     stages[START] = seconds - sum(stages.values())
     scores = {"parts": float(report["parts"])}
-    scores |= {name: report["scores"][key] for name, key in SCORES.items()}
-    scores |= {name: 100 * report["scores"][key] for name, key in SHARES.items()}
+    # An early version does not say all of this.
+    told = report["scores"]
+    scores |= {name: told[key] for name, key in SCORES.items() if key in told}
+    scores |= {name: 100 * told[key] for name, key in SHARES.items() if key in told}
     return Cost(seconds, stages, scores)
 
 
@@ -84,13 +86,15 @@ class Comparison:
 
     @staticmethod
     def row(name: str, before: float, after: float) -> str:
-        return f"| {name} | {before:.2f} | {after:.2f} | {after / max(before, 1e-9):.2f} |"
+        ratio = f"{after / before:.2f}" if before else "-"
+        return f"| {name} | {before:.2f} | {after:.2f} | {ratio} |"
 
     def stages(self) -> list[str]:
-        """Of all fits together, most first."""
+        """Of all fits together, most first: a stage may be of one version alone."""
         sums = [sum((Counter(one.stages) for one in side), Counter()) for side in (self.before, self.after)]
-        whole = sum(sums[0].values())
-        large = [stage for stage, spent in sums[0].most_common() if spent > LEAST * whole]
+        least = [LEAST * sum(one.values()) for one in sums]
+        by_time = [stage for stage, _ in (sums[0] + sums[1]).most_common()]
+        large = [stage for stage in by_time if sums[0][stage] > least[0] or sums[1][stage] > least[1]]
         rows = [self.row(stage, *(one[stage] for one in sums)) for stage in large]
         rest = [sum(spent for stage, spent in one.items() if stage not in large) for one in sums]
         return [
@@ -101,10 +105,10 @@ class Comparison:
 
     def scores(self) -> list[str]:
         means = [
-            {name: mean(one.scores[name] for one in side) for name in side[0].scores}
+            {name: f"{mean(one.scores[name] for one in side):.4f}" for name in side[0].scores}
             for side in (self.before, self.after)
         ]
-        return [f"| {name} | {means[0][name]:.4f} | {means[1][name]:.4f} |" for name in means[0]]
+        return [f"| {name} | {means[0].get(name, '-')} | {after} |" for name, after in means[1].items()]
 
     def page(self) -> str:
         pairs = zip(self.before, self.after, strict=True)
@@ -145,16 +149,19 @@ def main() -> int:
     parser.add_argument("--sets", default="", metavar="A,B")
     parser.add_argument("--names", default="", metavar="A,B")
     parser.add_argument("--seeds", default="0", metavar="A,B")
+    parser.add_argument("--output", type=Path, default=TARGET, metavar="FILE")
     options = parser.parse_args()
     sets, names = ({*filter(None, text.split(","))} for text in (options.sets, options.names))
     given = [("sets", options.sets), ("names", options.names), ("seeds", options.seeds)]
     told = "".join(f" --{key} {value}" for key, value in given if value)
+    if options.output != TARGET:
+        told += f" --output benchmarks/results/{options.output.name}"
     found = Comparison(f"python benchmarks/cost.py --before PYTHON --shapes {options.shapes.name}{told}")
     for seed in map(int, options.seeds.split(",")):
         for entry in find_shapes(options.shapes, sets, names):
             costs = (fitted(python, entry, seed) for python in (options.before, options.after))
             print(found.add(f"{entry.name}, {seed}", *costs), flush=True)
-            write_bytes(TARGET, found.page().encode())
+            write_bytes(options.output, found.page().encode())
     return 0
 
 
