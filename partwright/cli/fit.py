@@ -68,7 +68,7 @@ def add_method(group: Group) -> None:
         choices=("draft", "normal", "high"),
         default="normal",
         help="how much time to spend; of high, superfrusta and solids keep the best of four growths, in "
-        "about four times the time of normal (default: %(default)s)",
+        "about three times the time of normal (default: %(default)s)",
     )
     option("--max-parts", metavar="N", type=int, help="at most N parts")
     option("--min-iou", metavar="X", type=float, help="stop at the fewest parts that reach IoU X")

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,9 @@ from partwright.superfrusta.several_growths import SeveralGrowths
 from partwright.superfrusta.sharp_edges import sharp_edge_warnings
 from partwright.superfrusta.starting import starting_rows
 from partwright.superfrusta.symmetric_fit import RepeatedPart
+
+if TYPE_CHECKING:
+    import trimesh
 
 _FAR_FEWER = 0.75  # of the parts
 _DEARER = 2.0  # times the price of a feature, that a part of the search has beside it
@@ -88,19 +92,17 @@ def fit(request: FitRequest[Settings]) -> Fitted:
     def of_leaves(leaves: list[RepeatedPart]) -> Assembly:
         return assembled(np.stack([leaf.row for leaf in leaves]), moves=[leaf.moves for leaf in leaves])
 
+    meshed = _Meshed(shape, of_leaves)
     try:
         known = holes.cut()
         if whole_search:
             if search.mending:
                 search.polish(shape, known)
             with search.timed("rejoin"):
-                surface = partial(_surface, shape, of_leaves)
-                search.leaves = rejoined(
-                    shape, search.samples, search.leaves, search.settings, surface, known
-                )
+                search.leaves = rejoined(shape, search.samples, search.leaves, search.settings, meshed, known)
     except CancelledError:
         outcome = "interrupted"
-    whole = of_leaves(search.leaves)
+    whole = found = of_leaves(search.leaves)
     if features is not None:
         # Of the search none says how it would be drawn: there a part costs more than a feature does.
         count = len(search.leaves)
@@ -125,15 +127,34 @@ def fit(request: FitRequest[Settings]) -> Fitted:
         missing = featured.holes_left_out(own)
         told += hole_warnings(shape, missing)
         told += mouth_warnings(shape, featured.mouths_left_out(own, missing))
-    return Fitted(whole, outcome, search.seconds, search.history, tuple(reversed(curve)), warnings=told)
+    return Fitted(
+        whole,
+        outcome,
+        search.seconds,
+        search.history,
+        tuple(reversed(curve)),
+        warnings=told,
+        surface=meshed.of(search.leaves) if whole is found else None,
+    )
 
 
-def _surface(
-    shape: Shape, assembled: Callable[[list[RepeatedPart]], Assembly], leaves: list[RepeatedPart]
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """As it will be seen, vertices (V, 3) in the unit frame and faces (F, 3)."""
-    mesh = mesh_assembly(assembled(leaves))
-    return shape.frame.to_unit(mesh.vertices), np.asarray(mesh.faces, np.int64)
+@dataclass
+class _Meshed:
+    """The surface of an assembly as it will be seen. The last one is kept: it may be the result's."""
+
+    shape: Shape
+    assembled: Callable[[list[RepeatedPart]], Assembly]
+    leaves: list[RepeatedPart] | None = None
+    mesh: trimesh.Trimesh | None = None
+
+    def __call__(self, leaves: list[RepeatedPart]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """Vertices (V, 3) in the unit frame and faces (F, 3)."""
+        self.leaves, self.mesh = leaves, mesh_assembly(self.assembled(leaves))
+        return self.shape.frame.to_unit(self.mesh.vertices), np.asarray(self.mesh.faces, np.int64)
+
+    def of(self, leaves: list[RepeatedPart]) -> trimesh.Trimesh | None:
+        """That of these, if they were the last."""
+        return self.mesh if self.leaves is leaves else None
 
 
 def _of_features(

@@ -14,8 +14,8 @@ from scipy.spatial.transform import Rotation
 
 from partwright.fields.columns import Column
 from partwright.fitting import fit
-from partwright.meshing import mesh_field
-from partwright.methods import Run
+from partwright.meshing import mesh_assembly, mesh_field
+from partwright.methods import FitRequest, Run
 from partwright.shapes import Shape, load_shape
 from partwright.superfrusta.objective import score
 from partwright.superfrusta.rejoining import Pieces, Surface, is_one, needed, rejoined
@@ -155,6 +155,14 @@ def test_what_the_last_changes_part_is_joined_again(monkeypatch: pytest.MonkeyPa
         search.leaves = apart
 
     monkeypatch.setattr(ResidualFit, "polish", parting)
-    result = fit(of_balls(True), quality="draft", threads=1)
-    assert len(result.assembly) == 3
+    shape = of_balls(True)
+    fitted = FitRequest(shape, Settings.for_quality("draft"), Run(threads=1)).fitted()
+    assert len(fitted.assembly) == 3
+    # What was looked at last is the surface of the result.
+    surface = mesh_assembly(fitted.assembly)
+    assert fitted.surface is not None
+    assert np.array_equal(fitted.surface.vertices, surface.vertices)
+    assert np.array_equal(fitted.surface.faces, surface.faces)
+    result = fit(shape, quality="draft", threads=1)
     assert not result.warnings
+    assert np.array_equal(result.surface.vertices, surface.vertices)
