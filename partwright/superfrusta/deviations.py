@@ -54,15 +54,13 @@ class Deviations:
     @property
     def by_part(self) -> NDArray[np.float64]:
         """(M,) the largest of each part; 0 where it is nowhere off."""
-        result = np.zeros(self.parts)
-        np.maximum.at(result, self.part, self.off)
-        return result
+        return largest(self.part, self.off, self.parts)
 
     @property
     def norm(self) -> float:
         """One length for all places, whatever is further off than a sixth of the longest side: with few parts
         overlaps tell what else is left out."""
-        return norm(by_place(places(self.part, self.points), np.minimum(self.off, _MOST)))
+        return norm(largest(places(self.part, self.points), np.minimum(self.off, _MOST)))
 
     def worst(self, part: int) -> int:
         """The point at which a part is furthest off."""
@@ -90,10 +88,10 @@ def places(part: NDArray[np.int64], points: Floats) -> NDArray[np.int64]:
     return np.unique(code, return_inverse=True)[1].astype(np.int64)
 
 
-def by_place(place: NDArray[np.int64], off: Floats) -> NDArray[np.float64]:
-    """(P,) the largest of each place."""
-    result = np.zeros(place.max(initial=-1) + 1)
-    np.maximum.at(result, place, off)
+def largest(of: NDArray[np.int64], off: Floats, count: int = 0) -> NDArray[np.float64]:
+    """(P,) the largest of each part or place that points (n,) are of, at least so many; 0 where none is."""
+    result = np.zeros(max(count, of.max(initial=-1) + 1))
+    np.maximum.at(result, of, off)
     return result
 
 

@@ -31,7 +31,7 @@ Leaves = list[RepeatedPart]
 _GivenUp = tuple[NDArray[np.float32], float]  # a point, and how far about it
 
 _ENOUGH = 0.031  # unit lengths, 1.7 % of the longest side, 0.96 % outwards: what is nearer is left alone
-_LOOKED_AT = 2  # that are looked at for each that is changed: of some no way is known
+_LOOKED_AT = 2  # places that are looked at for each that is changed: of some no way is known
 _SAME_PLACE = 0.03  # unit lengths: what is as near to a place that is changed is changed with it
 _REFITTED = 2  # changes of one place that are polished, of those that promise most
 _LOOKS = 6  # at each

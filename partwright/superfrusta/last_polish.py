@@ -19,7 +19,7 @@ from partwright.fields.columns import Column
 from partwright.fields.kernel import Target
 from partwright.shapes import Shape
 from partwright.superfrusta.close_look import CloseLook, Seen
-from partwright.superfrusta.deviations import by_place, norm, places
+from partwright.superfrusta.deviations import largest, norm, places
 from partwright.superfrusta.objective import score, volume_iou
 from partwright.superfrusta.refining import penalties, sharpened
 from partwright.superfrusta.samples import FitSamples, Rows
@@ -120,7 +120,7 @@ class Polish:
         looked, scored = partial(self.look.deviations, copies), partial(score, samples, copies)
         off, reached = both(looked, scored, samples.threads)
         place = places(self.steps.leaf[off.part], off.points)
-        furthest = by_place(place, off.off)
+        furthest = largest(place, off.off)
         glaring = float(np.maximum(furthest - _GLARING, 0).sum())
         price = self.firmness * norm(furthest) + _GLARES * glaring
         return Trial(rows, off, place, furthest, reached, reached - price)

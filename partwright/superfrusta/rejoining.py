@@ -7,20 +7,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
-from scipy.spatial.transform import Rotation
 
+from partwright.approximation.sketches.directions import frame_along
+from partwright.assembly.similarity import quaternions
 from partwright.fields.columns import ROTATION, SIZE, TRANSLATION, WIDTH, Column
-from partwright.meshing.small_components import components
 from partwright.shapes import Shape
-from partwright.shapes.topology import signed_volumes
+from partwright.shapes.topology import components, signed_volumes
 from partwright.superfrusta.families import locked_values, with_locked_values
 from partwright.superfrusta.growing import Region, fit_regions
 from partwright.superfrusta.limits import LEAST_BLEND, SHORTEST
@@ -56,11 +55,11 @@ class Pieces:
 
     @classmethod
     def of(cls, vertices: Floats, faces: NDArray[np.int64]) -> Pieces:
-        count, component = components(faces, len(vertices))
+        component = components(len(vertices), faces[:, [0, 1]].ravel(), faces[:, [1, 2]].ravel())
         volume = signed_volumes(vertices, faces, component[faces[:, 0]])
         order = np.argsort(-volume, kind="stable")
         order = order[volume[order] > _CRUMB * volume.sum()]
-        number = np.full(count, -1)
+        number = np.full(len(volume), -1)
         number[order] = np.arange(len(order))
         return cls(vertices, number[component])
 
@@ -87,8 +86,9 @@ def rejoined(
     if apart.count < 2:
         return leaves
     last = len(leaves) - known
-    for way in (_fitted, _rods):
-        new = way(samples, apart, rows, field, settings)
+    ways = partial(_fitted, samples, apart, rows, field, settings), partial(_rods, samples, apart, settings)
+    for way in ways:
+        new = way()
         room = len(new) if settings.max_parts is None else settings.max_parts - len(leaves)
         if not 0 < len(new) <= room:
             continue
@@ -102,8 +102,8 @@ def rejoined(
 def _is_body(shape: Shape, samples: FitSamples) -> bool:
     """Whether a shape is one: by its voxels, where its surfaces go through one another, or by its surface,
     where its walls are thinner than those."""
-    voxels, _ = ndimage.label(samples.grid.values < 0, _ALL_AROUND)
-    return int(voxels.max()) == 1 or Pieces.of(shape.vertices, shape.faces).count == 1
+    _, bodies = ndimage.label(samples.grid.values < 0, _ALL_AROUND)
+    return bool(bodies == 1) or Pieces.of(shape.vertices, shape.faces).count == 1
 
 
 def is_one(samples: FitSamples, rows: Rows, field: NDArray[np.float32]) -> bool:
@@ -120,22 +120,14 @@ def is_one(samples: FitSamples, rows: Rows, field: NDArray[np.float32]) -> bool:
     link, flat = np.concatenate(links, axis=1), field.ravel()
     # Nothing that is nearer to a point within than the surface is outside.
     sure = -flat[link].sum(axis=0) > samples.grid.spacing
-    piece = _linked(link[:, sure], field.size)
+    piece = components(field.size, *link[:, sure])
     asked = link[:, ~sure & (piece[link[0]] != piece[link[1]])]
     ends = samples.grid_points[asked]
     between = (ends[0] + _BETWEEN * (ends[1] - ends[0])).reshape(-1, 3).astype(np.float32)
     open_ = (samples.distance_of(rows, between).reshape(len(_BETWEEN), -1) < 0).all(axis=0)
-    size = np.bincount(
-        _linked(np.concatenate([link[:, sure], asked[:, open_]], axis=1), field.size)[flat < 0]
-    )
+    known = np.concatenate([link[:, sure], asked[:, open_]], axis=1)
+    size = np.bincount(components(field.size, *known)[flat < 0])
     return bool(np.count_nonzero(size > _CRUMB * size.sum()) < 2)
-
-
-def _linked(links: NDArray[np.int64], count: int) -> NDArray[np.int64]:
-    """(count,) numbers of what links (2, N) join."""
-    one, other = links
-    graph = coo_array((np.ones(len(one), np.int8), (one, other)), shape=(count, count))
-    return np.asarray(connected_components(graph, directed=False)[1], np.int64)
 
 
 def needed(count: int, necks: Iterable[tuple[Neck, list[int]]]) -> list[Neck]:
@@ -179,14 +171,10 @@ def _left_open(
             yield (ndimage.binary_dilation(label == one, _ALL_AROUND) & solid).ravel(), pieces
 
 
-def _rods(
-    samples: FitSamples, apart: Pieces, rows: Rows, field: NDArray[np.float32], settings: Settings
-) -> Rows:
+def _rods(samples: FitSamples, apart: Pieces, settings: Settings) -> Rows:
     """Cylinders (K, 17) across gaps that are too narrow for a fit to feel, as thick as the shape is there."""
-    found = needed(apart.count, _gaps(samples, apart))
-    if not found:
-        return rows[:0]
-    return with_locked_values(np.stack(found), locked_values(settings.family, settings.smooth))
+    found = np.array(needed(apart.count, _gaps(samples, apart)), np.float32).reshape(-1, WIDTH)
+    return with_locked_values(found, locked_values(settings.family, settings.smooth))
 
 
 def _gaps(samples: FitSamples, apart: Pieces) -> Iterator[tuple[NDArray[np.float32], list[int]]]:
@@ -209,8 +197,7 @@ def _cylinder(one: Floats, other: Floats, radius: float) -> NDArray[np.float32]:
     length = float(np.linalg.norm(along))
     row = np.zeros(WIDTH, np.float32)
     row[TRANSLATION] = (one + other) / 2
-    turn = Rotation.align_vectors(along[None], [[0, 0, 1]])[0] if length > 0 else Rotation.identity()
-    row[ROTATION] = turn.as_quat(scalar_first=True)
+    row[ROTATION] = quaternions(frame_along(along / length) if length > 0 else np.eye(3))
     row[SIZE] = np.maximum([2 * radius, 2 * radius, length + 2 * radius], SHORTEST)
     row[[Column.ROUNDNESS, Column.TAPER, Column.SIGN]] = 1
     row[Column.BLEND] = LEAST_BLEND
