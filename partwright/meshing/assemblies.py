@@ -29,7 +29,8 @@ _FINEST = 2.0  # an assembly's resolution may grow by this for the sake of thin 
 _PART_CELLS = 120_000  # a part's surface is given at most this many cells
 _MOST = 1024.0  # cells along one axis of a part
 _LEAST = 24  # cells along the longest side of a thin part, or of what cuts it
-_SCRAP = 8  # what is nowhere nearer to the assembly than this part of a cell is none of it
+_CRUMB = 3.0  # cells; a component that is shorter along each axis is what is left of too thin a sheet
+_SCRAP = 8  # what is shorter, or nowhere nearer to the assembly, than this part of a cell is none of it
 _CHORDS = 32  # a chord of an exact mesh is this part of a cell from its surface at most
 _ROOM = 1e-3  # of the longest side, around the bounds
 _MESHES_KEPT = 8  # of parts in their own frames, for what comes again soon: some megabytes each
@@ -65,9 +66,9 @@ def mesh_assembly(
     if not solids:
         return _marched(assembly, cell, sharp)
     try:
-        return united(_marched(assembly, cell, sharp), solids)
+        return united(_marched(assembly, cell, sharp), solids, cell / _SCRAP)
     except NoSurfaceError:  # nothing but sheets, all of which slipped through the cells
-        return united(None, solids)
+        return united(None, solids, cell / _SCRAP)
 
 
 def _learned(assembly: Assembly | Part, cell: float) -> trimesh.Trimesh | None:
@@ -114,7 +115,7 @@ def _marched(node: Assembly | Part, cell: float, sharp: bool) -> trimesh.Trimesh
     if carved and has_thin_walls(local.distance, mesh.vertices, across):
         counts = finest
         mesh = mesh_field(local.distance, -room, room, counts, lipschitz=lipschitz(node), sharp=sharp)
-    vertices, faces = without_small_components(mesh.vertices, mesh.faces, np.full(3, 2 * room.max() / counts))
+    vertices, faces = without_small_components(mesh.vertices, mesh.faces, _CRUMB * 2 * room.max() / counts)
     return trimesh.Trimesh(frame.inverse()(vertices), faces, process=False)
 
 

@@ -21,20 +21,21 @@ _BETTER = 0.5  # of the distance that the polygon's middle has, what a feature m
 _REACH = 2.0  # cells beyond its own in which the rim of a wedge that is thinner than a cell may lie
 _ON = 0.15  # of a cell, how far from the zero level such a rim may be
 _TURNED = 0.1  # of a fan's area, what may have its back to the normals
-_STEP = 0.02  # finite differences, in cells
+NORMAL_STEP = 0.02  # finite differences, in cells
 _TETRAHEDRON = np.array([(1, -1, -1), (-1, -1, 1), (-1, 1, -1), (1, 1, 1)], dtype=np.float64)
 
 
-def sharpen(polygons: Polygons, distance: Distance, grid: Grid) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices (V, 3) and triangles (F, 3) of the surface with its features."""
-    normals = field_normals(distance, polygons.vertices, _STEP * float(grid.cell.min()))
+def sharpen(polygons: Polygons, distance: Distance, grid: Grid) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Vertices (V, 3) and triangles (F, 3) of the surface with its features, and normals (U, 3) of the field
+    at the polygons' corners, which come first."""
+    normals = field_normals(distance, polygons.vertices, NORMAL_STEP * float(grid.cell.min()))
     candidates = _with_features(polygons, normals)
     chosen, extra = _feature_points(polygons, normals, candidates, distance, grid)
     plain = np.ones(len(polygons), dtype=bool)
     plain[chosen] = False
     fans = _fans(polygons, chosen)
     vertices = np.concatenate([polygons.vertices, extra])
-    return vertices, np.concatenate([polygons.triangles(plain), fans])
+    return vertices, np.concatenate([polygons.triangles(plain), fans]), normals
 
 
 def field_normals(distance: Distance, points: np.ndarray, step: float) -> np.ndarray:

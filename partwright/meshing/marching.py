@@ -12,6 +12,7 @@ from partwright.fields.base import LIPSCHITZ
 from partwright.meshing.blocks import BLOCK, Distance, Grid, evaluate, surface_blocks
 from partwright.meshing.features import sharpen
 from partwright.meshing.polygons import Polygons
+from partwright.meshing.refinement import refined
 from partwright.meshing.tables import CORNERS, EDGE_AXIS, EDGES, loop_table
 from partwright.rows import corners
 
@@ -39,7 +40,8 @@ def mesh_field(
 
     Only cells near the surface are evaluated (see `blocks`), and every vertex is moved along its edge onto
     the zero level by regula falsi, so its error is far below a cell. With `sharp`, edges and corners of the
-    surface are kept where the normals around a cell disagree (Kobbelt et al. 2001, Extended Marching Cubes).
+    surface are kept where the normals around a cell disagree (Kobbelt et al. 2001, Extended Marching Cubes),
+    and triangles across fillets are halved until they follow them (see `refinement`).
     The mesh is a closed two-manifold for every field: see `tables`.
 
     distance: maps points (N, 3) float32 to values (N,), negative inside; best in a frame around the origin.
@@ -56,7 +58,7 @@ def mesh_field(
     grid = Grid.around(low, high, _cell(low, high, resolution))
     polygons = marching_polygons(distance, grid, lipschitz)
     if sharp:
-        vertices, faces = sharpen(polygons, distance, grid)
+        vertices, faces = refined(*sharpen(polygons, distance, grid), distance, grid)
     else:
         vertices, faces = polygons.vertices, polygons.triangles()
     return trimesh.Trimesh(vertices, faces, process=False)

@@ -6,8 +6,6 @@ import numpy as np
 
 from partwright import _kernel
 
-_SMALLEST = 3.0  # cells; a component that is shorter along each axis is small
-
 
 def components(faces: np.ndarray, count: int) -> tuple[int, np.ndarray]:
     """How many components faces (F, 3) between `count` vertices V make, and which each vertex (V,) is of."""
@@ -16,9 +14,9 @@ def components(faces: np.ndarray, count: int) -> tuple[int, np.ndarray]:
 
 
 def without_small_components(
-    vertices: np.ndarray, faces: np.ndarray, cell: np.ndarray
+    vertices: np.ndarray, faces: np.ndarray, shortest: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices (V, 3) and faces (F, 3) without components shorter than three cells along each axis.
+    """Vertices (V, 3) and faces (F, 3) without components shorter than a length along all axes.
 
     Where all are that small, nothing is dropped.
     """
@@ -26,7 +24,7 @@ def without_small_components(
     order = np.argsort(piece, kind="stable")
     first = np.searchsorted(piece[order], np.arange(pieces))
     size = np.maximum.reduceat(vertices[order], first) - np.minimum.reduceat(vertices[order], first)
-    large = np.asarray((size >= _SMALLEST * cell).any(axis=1))
+    large = np.asarray((size >= shortest).any(axis=1))
     if large.all() or not large.any():
         return vertices, faces
     kept = large[piece]

@@ -16,7 +16,8 @@ import numpy as np
 from partwright.assembly import Part
 from partwright.assembly.tree import Node
 from partwright.errors import NoSurfaceError
-from partwright.meshing.manifolds import as_manifold, as_mesh, surface_of
+from partwright.meshing.manifolds import as_manifold, surface_of
+from partwright.meshing.small_components import without_small_components
 
 if TYPE_CHECKING:
     import trimesh
@@ -63,19 +64,23 @@ def without_scraps(solids: list[Manifold], distance: Distance, near: float) -> l
     return [piece for piece in pieces if distance(surface_of(piece)[0]).min() < near]
 
 
-def united(mesh: trimesh.Trimesh | None, solids: list[Manifold]) -> trimesh.Trimesh:
+def united(mesh: trimesh.Trimesh | None, solids: list[Manifold], crumb: float) -> trimesh.Trimesh:
     """A closed mesh, if there is one, and solids as one closed mesh.
+
+    crumb: where two surfaces are all but the same crumbs are left; those shorter than this are left out.
 
     Raises:
         NoSurfaceError: nothing is left of any.
     """
+    import trimesh
     from manifold3d import Manifold, OpType
 
     thick = [] if mesh is None else [as_manifold(mesh)]
     whole = Manifold.batch_boolean(thick + solids, OpType.Add)
     if whole.is_empty():
         raise NoSurfaceError("Nothing is left of the assembly: what it subtracts takes all away.")
-    return as_mesh(whole)
+    vertices, faces = without_small_components(*surface_of(whole), crumb)
+    return trimesh.Trimesh(vertices, faces, process=False)
 
 
 def _solids(node: Node, mesh: Mesher) -> list[Manifold]:

@@ -240,7 +240,8 @@ def named_meshes(path: Path) -> dict[str, trimesh.Trimesh]:
 @pytest.mark.parametrize("suffix", [".glb", ".obj"])
 def test_unreal_finds_colliders_by_their_names(tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"a{suffix}"
-    export(varied(), path, physics="unreal", resolution=24, tolerance=0.01)
+    pill = Part(Capsule(5, 60), (0, 240, 0), name="pill")
+    export(varied() | pill, path, physics="unreal", resolution=24, tolerance=0.01)
     meshes = named_meshes(path)
     colliders = {name: mesh for name, mesh in meshes.items() if name[:4] in ("UBX_", "USP_", "UCP_", "UCX_")}
     for name, mesh in colliders.items():
@@ -254,7 +255,8 @@ def test_unreal_finds_colliders_by_their_names(tmp_path: Path, suffix: str) -> N
         slack = 0.1 * np.ptp(shown.bounds, axis=0).max()
         assert (mesh.bounds[0] > shown.bounds[0] - slack).all()
         assert (mesh.bounds[1] < shown.bounds[1] + slack).all()
-    assert {"UBX_block_01", "USP_ball_01", "UCX_foot_01", "UCX_plate_04", "UCP_leg_a_01"} <= {*colliders}
+    hulls = {"UCX_foot_01", "UCX_leg_a_01", "UCX_plate_04"}
+    assert {"UBX_block_01", "USP_ball_01", "UCP_pill_01", *hulls} <= {*colliders}
     assert "spike_" in meshes
     whole = trimesh.boolean.union([m for n, m in colliders.items() if "plate" in n], engine="manifold")
     assert whole.volume == pytest.approx(abs(meshes["plate"].volume), rel=0.05)
