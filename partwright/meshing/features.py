@@ -18,6 +18,7 @@ _HALF_SHARP = ((1 + _SHARP) / 2) ** 0.5 + 1e-6  # of half that angle, and roundi
 _FLAT = 0.06  # directions with a smaller share of the largest eigenvalue are left to the mean
 _PROJECTIONS = 4  # between the cell and the line or point where the planes meet
 _BETTER = 0.5  # of the distance that the polygon's middle has, what a feature may have
+_NEAR = 0.1  # of a cell, from the zero level, what it may be anyway: it is moved there
 _REACH = 2.0  # cells beyond its own in which the rim of a wedge that is thinner than a cell may lie
 _ON = 0.15  # of a cell, how far from the zero level such a rim may be
 _TURNED = 0.1  # of a fan's area, what may have its back to the normals
@@ -72,8 +73,8 @@ def _feature_points(
 
     A rim thinner than a cell passes between the lattice's corners: its place may lie beyond the polygon's
     cell, as long as it is on the zero level and the fan around it does not fold. Else it is kept to the cell,
-    so that fans of neighbours do not overlap, and dropped where it lies farther from the zero level than the
-    polygon's middle does (the normals belonged to a ripple, not to a feature).
+    so that fans of neighbours do not overlap, and dropped where it lies hardly nearer to the zero level than
+    the polygon's middle does, and not close to it (the normals belonged to a ripple, not to a feature).
     """
     index, used = polygons.index[candidates], polygons.used[candidates][:, :, None]
     points, around = polygons.vertices[index], normals[index] * used
@@ -99,7 +100,8 @@ def _feature_points(
     ]
     place = meeting(0.0)
     place[outside] = far[outside]
-    better = np.abs(evaluate(distance, place)) < _BETTER * np.abs(evaluate(distance, middle))
+    least = np.maximum(_BETTER * np.abs(evaluate(distance, middle)), _NEAR * float(grid.cell.min()))
+    better = np.abs(evaluate(distance, place)) < least
     return candidates[better], place[better]
 
 
