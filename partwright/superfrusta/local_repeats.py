@@ -76,7 +76,7 @@ class _Forms:
         ways = list(self.onto_others(base))
         kept: list[Isometry] = []
         taken, there = [self.middles[base], *self.middles[: self.locked]], list[Floats]()
-        for one in chain(ways, chain.from_iterable(self.powers(base, way, there) for way in ways)):
+        for one in chain(ways, self.all_powers(base, ways, there)):
             place = self.place(base, one)
             if _apart(place, [*taken, *there]) > _ONE_PLACE:
                 kept.append(one)
@@ -92,10 +92,19 @@ class _Forms:
             if self.there(base, there):
                 yield (there,)
 
+    def all_powers(self, base: int, ways: Sequence[Isometry], known: Sequence[Floats]) -> Iterator[Isometry]:
+        """Of moves and of their inverses; none of one that is a power of another, as its are, too."""
+        found: list[Isometry] = []
+        for way in ways:
+            if not any(one.near(way) for one in found):
+                for one in self.powers(base, way, known):
+                    found.append(one)
+                    yield one
+
     def powers(self, base: int, way: Isometry, known: Sequence[Floats]) -> Iterator[Isometry]:
-        """Of a move and of its inverse, for as long as each leads where what the part stands for is, and not
-        back to the part. Those to a place that is `known`, where powers of a turn lead again and again, are
-        not refined where they need not be."""
+        """Of a move, and of its inverse where it does not come round to the part, for as long as each leads
+        where what the part stands for is. Those to a place that is `known`, where powers of a turn lead again
+        and again, are not refined where they need not be."""
         for step in (way, way.inverse()):
             power = step
             while _apart(self.place(base, power), [self.middles[base]]) > _ONE_PLACE:
@@ -106,6 +115,8 @@ class _Forms:
                     break
                 yield there
                 power = step @ power
+            else:
+                return  # it came round to the part, and the other way round it would come to the same places
 
     def place(self, base: int, isometry: Isometry) -> Floats:
         """Where (3,) a part's middle comes to."""
