@@ -10,7 +10,7 @@ from partwright.assembly import Assembly, Node, Part
 from partwright.assembly.tree import Operation
 from partwright.errors import NoSurfaceError
 from partwright.fields import Box
-from partwright.meshing import has_exact_mesh, mesh_assembly, mesh_csg
+from partwright.meshing import has_exact_mesh, lean_assembly, mesh_assembly, mesh_csg
 
 if TYPE_CHECKING:
     import trimesh
@@ -37,8 +37,10 @@ def check_ends(assembly: Assembly) -> None:
         raise NoSurfaceError(f"the assembly does not end along {axes}; intersect it with what bounds it")
 
 
-def atomic_mesh(node: Node, assembly: Assembly) -> trimesh.Trimesh:
+def atomic_mesh(node: Node, assembly: Assembly, lean: bool = True) -> trimesh.Trimesh:
     """The closed mesh of such a node in the assembly's frame; cut off at its bounds where it does not end.
+
+    lean: with no more triangles than it needs.
 
     Raises:
         NoSurfaceError: nothing of it lies there.
@@ -46,7 +48,9 @@ def atomic_mesh(node: Node, assembly: Assembly) -> trimesh.Trimesh:
     lower, upper = assembly.bounds()
     if not np.isfinite(node.bounds()).all() and np.isfinite([lower, upper]).all():
         node = Assembly((box_between(lower, upper), node), "intersection")
-    return mesh_csg(node) if has_exact_mesh(node) else mesh_assembly(node, _CELLS)
+    if has_exact_mesh(node):
+        return mesh_csg(node)
+    return lean_assembly(node, _CELLS) if lean else mesh_assembly(node, _CELLS)
 
 
 def box_between(lower: np.ndarray, upper: np.ndarray) -> Part:

@@ -14,7 +14,7 @@ from partwright.assembly import Assembly, Node, Part
 from partwright.assembly.names import unique_names
 from partwright.assembly.palette import palette
 from partwright.errors import NoSurfaceError, NothingToExportError
-from partwright.meshing import mesh_assembly, mesh_part
+from partwright.meshing import lean_assembly, lean_part, mesh_assembly, mesh_part
 
 if TYPE_CHECKING:
     import trimesh
@@ -79,6 +79,12 @@ def piece_mesh(piece: Piece, resolution: int) -> trimesh.Trimesh:
     return mesh_part(node, resolution) if isinstance(node, Part) else mesh_assembly(node, WHOLE)
 
 
+def lean_piece(piece: Piece, resolution: int) -> trimesh.Trimesh:
+    """As `piece_mesh`, for files: with no more triangles than it needs."""
+    node = piece.node
+    return lean_part(node, resolution) if isinstance(node, Part) else lean_assembly(node, WHOLE)
+
+
 def piece_meshes(assembly: Assembly, resolution: int) -> list[tuple[Piece, trimesh.Trimesh]]:
     """Every piece that has a volume, with its mesh, each closed by itself.
 
@@ -88,7 +94,7 @@ def piece_meshes(assembly: Assembly, resolution: int) -> list[tuple[Piece, trime
     found = []
     for piece in pieces(assembly):
         with suppress(NoSurfaceError):  # it only shows where it blends
-            found.append((piece, piece_mesh(piece, resolution)))
+            found.append((piece, lean_piece(piece, resolution)))
     return require_some(assembly, found)
 
 
@@ -120,7 +126,7 @@ def whole_surface(assembly: Assembly, resolution: int) -> trimesh.Trimesh:
         NothingToExportError: it has none.
     """
     try:
-        return mesh_assembly(assembly, resolution)
+        return lean_assembly(assembly, resolution)
     except NoSurfaceError as error:
         raise NothingToExportError(
             f"nothing to export: the assembly has no surface at {resolution} cells along its longest side; "

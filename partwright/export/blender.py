@@ -17,16 +17,15 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from partwright.approximation.atomic_nodes import atomic_mesh, is_atomic
+from partwright.approximation.atomic_nodes import is_atomic
 from partwright.assembly import Assembly, Node, Part
 from partwright.assembly.palette import palette
 from partwright.atomic_io import write_bytes
 from partwright.errors import NoSurfaceError
 from partwright.export.formats import Format, Holds
 from partwright.export.identifiers import comment, free_name
-from partwright.export.texturing import own_colour, textured
+from partwright.export.texturing import own_colour, own_mesh, textured, whole_mesh
 from partwright.fields import Pipe
-from partwright.meshing import mesh_part
 from partwright.shapes import METRES, canonical_unit
 
 if TYPE_CHECKING:
@@ -159,7 +158,7 @@ def _part(part: Part, resolution: int) -> _Solid:
         entry |= {name: list(v) if isinstance(v := getattr(f, name), tuple) else v for name in _PARAMETERS}
     if isinstance(part.field, Pipe):
         entry |= {"radius": part.field.radius, "thickness": part.field.thickness}
-    return _looking(entry, mesh_part(Part(part.field), resolution), part)
+    return _looking(entry, own_mesh(part, resolution), part)
 
 
 def _atomic(node: Node, assembly: Assembly) -> _Solid:
@@ -167,7 +166,7 @@ def _atomic(node: Node, assembly: Assembly) -> _Solid:
     fields = ((part.name, part.field.quadric()) for part in node.parts)
     quadrics = {name: list(own.coefficients) for name, own in fields if own is not None}
     entry = {"location": [0.0] * 3, "rotation": [1.0, 0.0, 0.0, 0.0], "kind": "convex", "blend": 0.0}
-    return _looking(entry | quadrics, atomic_mesh(node, assembly), node.parts[0], placed=True)
+    return _looking(entry | quadrics, whole_mesh(node, assembly), node.parts[0], placed=True)
 
 
 def _looking(entry: dict[str, Any], mesh: trimesh.Trimesh, part: Part, placed: bool = False) -> _Solid:

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from partwright import __version__
-from partwright.approximation.atomic_nodes import atomic_mesh, check_ends, is_atomic, is_operation
+from partwright.approximation.atomic_nodes import check_ends, is_atomic, is_operation
 from partwright.approximation.pieces import require_some
 from partwright.approximation.separation import separated, subtracted_names
 from partwright.assembly import Assembly, Node, Part, Similarity
@@ -35,8 +35,7 @@ from partwright.export.glb_joined import add_patches
 from partwright.export.glb_physics import KHR, check_physics
 from partwright.export.identifiers import free_name
 from partwright.export.shared_groups import Shared, shared
-from partwright.export.texturing import own_colour, textured
-from partwright.meshing import mesh_part
+from partwright.export.texturing import own_colour, own_mesh, textured, whole_mesh
 from partwright.textures.maps import without_maps
 
 if TYPE_CHECKING:
@@ -236,7 +235,7 @@ class _Scene:
         own = part.pose
         about = _extras(part) | extras
         try:
-            mesh = mesh_part(Part(part.field), self.resolution)
+            mesh = own_mesh(part, self.resolution)
         except NoSurfaceError:  # it only shows where it blends
             self._add_bare(part.name, parent, pose @ own.matrix(), about)
             return part.name
@@ -263,7 +262,7 @@ class _Scene:
         }
         name = self._name_of_whole(node)
         try:
-            mesh = self._looking(atomic_mesh(node, self.assembly), parts[0], placed=True)
+            mesh = self._looking(whole_mesh(node, self.assembly), parts[0], placed=True)
         except NoSurfaceError:
             self._add_bare(name, parent, pose, about)
         else:

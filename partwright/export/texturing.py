@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from partwright.assembly import Part
+from partwright.approximation.atomic_nodes import atomic_mesh
+from partwright.assembly import Assembly, Node, Part
+from partwright.meshing import lean_part, mesh_part
 from partwright.shapes.corner_normals import corner_normals
 from partwright.textures.maps import RELIEF, part_map
 from partwright.textures.unwrapping import unwrapped
@@ -42,6 +44,22 @@ class Textured:
     def relief_png(self) -> bytes:
         """None is empty."""
         return _png(self.relief) if self.relief is not None else b""
+
+
+def own_mesh(part: Part, resolution: int) -> trimesh.Trimesh:
+    """A part's mesh in its frame, with no more triangles than it needs; with all of them where it has a map,
+    which is read at their corners.
+
+    Raises:
+        NoSurfaceError: it has no volume.
+    """
+    alone = Part(part.field)
+    return lean_part(alone, resolution) if part_map(part) is None else mesh_part(alone, resolution)
+
+
+def whole_mesh(node: Node, assembly: Assembly) -> trimesh.Trimesh:
+    """`atomic_mesh`, likewise; it is shown in the map of its first part."""
+    return atomic_mesh(node, assembly, lean=part_map(node.parts[0]) is None)
 
 
 def textured(mesh: trimesh.Trimesh, part: Part, placed: bool = False) -> Textured | None:

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from partwright import __version__
-from partwright.approximation.atomic_nodes import atomic_mesh, check_ends, is_atomic, is_operation
+from partwright.approximation.atomic_nodes import check_ends, is_atomic, is_operation
 from partwright.approximation.pieces import nothing_to_export
 from partwright.approximation.separation import separated, subtracted_names
 from partwright.assembly import Assembly, Node, Part, Similarity
@@ -26,7 +26,7 @@ from partwright.export.axes import to_metres_z_up
 from partwright.export.formats import Format, Holds
 from partwright.export.identifiers import file_name, free_name
 from partwright.export.shared_groups import shared
-from partwright.export.texturing import own_colour, textured
+from partwright.export.texturing import own_colour, own_mesh, textured, whole_mesh
 from partwright.export.usd_physics import add_physics, body_of, check_physics
 from partwright.export.usd_prims import (
     define_mesh,
@@ -37,7 +37,6 @@ from partwright.export.usd_prims import (
     place,
     to_linear,
 )
-from partwright.meshing import mesh_part
 from partwright.shapes import METRES, canonical_unit, canonical_up
 from partwright.textures.maps import without_maps
 
@@ -156,7 +155,7 @@ class _Writer:
         taken = subtracted_names(node)
         about["parts"] = {p.name: _about(p, (p.name in taken) != subtracted) for p in parts}
         try:
-            mesh = atomic_mesh(node, self.assembly)
+            mesh = whole_mesh(node, self.assembly)
         except NoSurfaceError:
             about["note"] = _NO_SURFACE
         else:
@@ -168,7 +167,7 @@ class _Writer:
         about = _about(part, subtracted)
         pose = part.pose
         try:
-            mesh = mesh_part(Part(part.field), self.resolution)
+            mesh = own_mesh(part, self.resolution)
         except NoSurfaceError:
             mesh, about["note"] = None, _NO_SURFACE
         prim.SetCustomData({"partwright": _plain(about)})

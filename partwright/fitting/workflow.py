@@ -333,13 +333,14 @@ def _scored(
     made: trimesh.Trimesh | None,
     ahead: Ahead | None,
 ) -> tuple[Scores, trimesh.Trimesh]:
-    from partwright.meshing import mesh_assembly
+    from partwright.meshing import lean_assembly, mesh_assembly
     from partwright.metrics import evaluate
 
     with timed(seconds, "meshing"):
-        surface = made if made is not None else mesh_assembly(assembly)
+        whole = mesh_assembly(assembly) if made is None else made
+        surface = lean_assembly(assembly, mesh=whole)
     if ahead is not None:
         ahead.draw(surface)
     with timed(seconds, "scores"):
-        scores = evaluate(assembly, shape, seed=seed, emd=False, surface=surface)
+        scores = evaluate(assembly, shape, seed=seed, emd=False, surface=whole)
     return scores, surface
