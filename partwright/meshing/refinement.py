@@ -42,15 +42,18 @@ def refined(
     step, given = NORMAL_STEP * cell, len(normals)
     more, of_more = _onto(distance, vertices[given:], np.full(len(vertices) - given, cell), step)
     vertices, normals = np.concatenate([vertices[:given], more]), np.concatenate([normals, of_more])
-    settled = []
+    settled, known = [], 0
     for _ in range(_PASSES):
         edges = _bent(faces, normals)
+        # Those between older corners were looked at before, and what lies beyond them may be settled.
+        edges = edges[edges[:, 1] >= known]
         ends = vertices[edges]
         middles = ends.mean(axis=1)
         off = np.abs(evaluate(distance, middles)) > _OFF * cell
         if not off.any():
             break
         furthest = _FURTHEST * lengths(ends[off, 1] - ends[off, 0])
+        known = len(vertices)
         more, of_more = _onto(distance, middles[off], furthest, step)
         vertices, normals = np.concatenate([vertices, more]), np.concatenate([normals, of_more])
         whole, faces = _halved(faces, edges[off], vertices)
