@@ -69,20 +69,18 @@ def _name(node: Node) -> str:
     return node.name or (node.parts[0].name if isinstance(node, Assembly) else "")
 
 
-def piece_mesh(piece: Piece, resolution: int) -> trimesh.Trimesh:
+def piece_mesh(piece: Piece, resolution: int, lean: bool = False) -> trimesh.Trimesh:
     """A closed mesh of the piece alone; resolution: cells along it, `WHOLE` for a difference or intersection.
+
+    lean: with no more triangles than it needs, as for files.
 
     Raises:
         NoSurfaceError: it has no volume.
     """
     node = piece.node
-    return mesh_part(node, resolution) if isinstance(node, Part) else mesh_assembly(node, WHOLE)
-
-
-def lean_piece(piece: Piece, resolution: int) -> trimesh.Trimesh:
-    """As `piece_mesh`, for files: with no more triangles than it needs."""
-    node = piece.node
-    return lean_part(node, resolution) if isinstance(node, Part) else lean_assembly(node, WHOLE)
+    if isinstance(node, Part):
+        return lean_part(node, resolution) if lean else mesh_part(node, resolution)
+    return lean_assembly(node, WHOLE) if lean else mesh_assembly(node, WHOLE)
 
 
 def piece_meshes(assembly: Assembly, resolution: int) -> list[tuple[Piece, trimesh.Trimesh]]:
@@ -94,7 +92,7 @@ def piece_meshes(assembly: Assembly, resolution: int) -> list[tuple[Piece, trime
     found = []
     for piece in pieces(assembly):
         with suppress(NoSurfaceError):  # it only shows where it blends
-            found.append((piece, lean_piece(piece, resolution)))
+            found.append((piece, piece_mesh(piece, resolution, lean=True)))
     return require_some(assembly, found)
 
 

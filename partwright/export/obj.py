@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from partwright.approximation.collision import TOLERANCE
-from partwright.approximation.pieces import lean_piece, pieces, require_some, surfaces
+from partwright.approximation.pieces import piece_mesh, pieces, require_some, surfaces
 from partwright.assembly import Similarity
 from partwright.atomic_io import write_bytes
 from partwright.errors import NoSurfaceError, SettingError
@@ -73,7 +73,7 @@ def _with_colliders(
     names, objects = {}, []
     for piece in pieces(assembly, separate=True):
         try:
-            mesh = lean_piece(piece, cells)
+            mesh = piece_mesh(piece, cells, lean=True)
         except NoSurfaceError:  # it only shows where it blends
             continue
         names[piece.name] = free_name(plain_name(piece.name), taken)

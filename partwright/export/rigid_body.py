@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from partwright import __version__
 from partwright.approximation.change import Change
 from partwright.approximation.collision import Geometry, geometries
-from partwright.approximation.pieces import lean_piece, pieces
+from partwright.approximation.pieces import piece_mesh, pieces
 from partwright.atomic_io import write_bytes
 from partwright.export.axes import to_metres_z_up, unknowns
 from partwright.export.export_report import write_report
@@ -78,7 +78,7 @@ class Body:
         """Name, colour and own mesh of each piece that collides as something else than it is."""
         other = {geometry.piece for geometry in self.geometries if not geometry.exact}
         return [
-            (piece.name, piece.colour, lean_piece(piece, resolution))
+            (piece.name, piece.colour, piece_mesh(piece, resolution, lean=True))
             for piece in pieces(self.local, separate=True)
             if piece.name in other
         ]

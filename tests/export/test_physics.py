@@ -240,7 +240,7 @@ def named_meshes(path: Path) -> dict[str, trimesh.Trimesh]:
 @pytest.mark.parametrize("suffix", [".glb", ".obj"])
 def test_unreal_finds_colliders_by_their_names(tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"a{suffix}"
-    pill = Part(Capsule(5, 60), (0, 240, 0), name="pill")
+    pill = Part(SuperFrustum((2, 2, 50), roundness=1.0, dilation=4.0), (0, 240, 0), name="pill")  # nearly one
     export(varied() | pill, path, physics="unreal", resolution=24, tolerance=0.01)
     meshes = named_meshes(path)
     colliders = {name: mesh for name, mesh in meshes.items() if name[:4] in ("UBX_", "USP_", "UCP_", "UCX_")}
